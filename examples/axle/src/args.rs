@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use axlewire::{
     ikeya::{self, NodeId, Position, Rps},
+    time::Duration,
     ucp::{self, MotorControl},
 };
 use clap::{
@@ -154,6 +155,14 @@ pub(crate) fn seconds(text: &str) -> Result<u64, String> {
         return Err(format!("it is not within 0..={LONGEST} seconds"));
     }
     Ok((seconds * 1e6) as u64)
+}
+
+/// A time of up to a minute.
+pub(crate) fn short_time(text: &str) -> Result<Duration, String> {
+    match seconds(text)?.try_into() {
+        Ok(micros @ 0..=60_000_000) => Ok(Duration::from_micros(micros)),
+        _ => Err("it is not within 0..=60 seconds".to_owned()),
+    }
 }
 
 /// A probability.

@@ -74,6 +74,14 @@ pub(crate) struct MasterArgs {
     #[arg(long, value_name = "TIME")]
     reply_timeout: Option<Patience>,
 
+    /// Silence between two packets, seconds, for transceivers that need it
+    #[arg(long, value_name = "SECONDS", value_parser = args::short_time)]
+    gap: Option<Duration>,
+
+    /// How long a motor may turn on after its stop is confirmed, seconds; by default 2
+    #[arg(long, value_name = "SECONDS", value_parser = args::short_time)]
+    coast: Option<Duration>,
+
     /// The adapter hears what it sends, as on two wires with the receiver always on: take these
     /// echoes out
     #[arg(long)]
@@ -94,7 +102,7 @@ pub(crate) struct Bus<B: Boards = OneMotor> {
 impl MasterArgs {
     #[cfg(test)]
     pub(crate) const fn new(line: args::PortArgs, reply_timeout: Option<Patience>) -> Self {
-        Self { line, reply_timeout, echo: false }
+        Self { line, reply_timeout, gap: None, coast: None, echo: false }
     }
 
     pub(crate) const fn line(&self) -> &args::PortArgs {
@@ -105,7 +113,10 @@ impl MasterArgs {
     pub(crate) fn config(&self) -> MasterConfig {
         let is_network = self.line.port.starts_with("tcp:");
         let usual = if is_network { Patience::Network } else { Patience::Usb };
-        self.reply_timeout.unwrap_or(usual).config()
+        let mut config = self.reply_timeout.unwrap_or(usual).config();
+        config.turnaround_gap = self.gap.unwrap_or(config.turnaround_gap);
+        config.coast = self.coast.unwrap_or(config.coast);
+        config
     }
 
     /// Whether a longer time may be tried for answers that come too late.

@@ -34,6 +34,10 @@ fn the_options_of_a_master_are_its_settings() {
     let config = |patience| MasterArgs::new(PortArgs::new(None), patience).config();
     assert_eq!(config(None), MasterConfig::usb_adapter());
     assert_eq!(config(Some(Patience::Direct)), MasterConfig::direct());
+    let mut args = MasterArgs::new(PortArgs::new(None), None);
+    (args.gap, args.coast) = (Some(Duration::from_millis(2)), Some(Duration::from_secs(9)));
+    let config = args.config();
+    assert_eq!((config.turnaround_gap, config.coast), (args.gap.unwrap(), args.coast.unwrap()));
 }
 
 #[test]
