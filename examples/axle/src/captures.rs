@@ -14,9 +14,14 @@ use crate::{
 /// What a folder may hold besides captures.
 const EXTENSIONS: [&str; 4] = [".pcapng", ".pcap", ".pcapng.gz", ".pcap.gz"];
 
+/// Opens files and folders of captures, or standard input for none and `-`.
+pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
+    Input::open(in_order(paths, form)?, form)
+}
+
 /// The files, in the order of the times of their first packets, and then of their names. Several
 /// must all be captures with times.
-pub(crate) fn in_order(paths: &[PathBuf], form: Form) -> Result<Vec<PathBuf>, Failure> {
+fn in_order(paths: &[PathBuf], form: Form) -> Result<Vec<PathBuf>, Failure> {
     let mut files = Vec::new();
     for path in paths {
         if path.is_dir() { below(path, &mut files)? } else { files.push(path.clone()) }

@@ -12,7 +12,6 @@ use flate2::read::MultiGzDecoder;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use crate::{
-    captures,
     failure::Failure,
     hex::{self, Hex},
     pcapng,
@@ -60,13 +59,8 @@ pub(crate) struct Input {
 }
 
 impl Input {
-    /// Opens files and folders of captures, in the order of time, one at a time; or standard input
-    /// for none and `-`.
-    pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Self, Failure> {
-        let all = match paths {
-            [] => Vec::new(),
-            paths => captures::in_order(paths, form)?,
-        };
+    /// Opens these files, one at a time; or standard input for none and `-`.
+    pub(crate) fn open(all: Vec<PathBuf>, form: Form) -> Result<Self, Failure> {
         let mut rest = VecDeque::from(all.clone());
         let first = rest.pop_front();
         let mut input = Self::open_one(first.as_deref(), form)?;

@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(protocol) = choice.protocol {
         choice.permits(protocol)?;
     }
-    let mut input = Input::open(&args.files, args.form)?;
+    let mut input = captures::open(&args.files, args.form)?;
     if input.has_times()? {
         return capture::run(args, input, choice);
     }
@@ -81,7 +81,7 @@ pub(crate) fn frames_of(
     form: Form,
     chosen: Option<Protocol>,
 ) -> Result<(Protocol, Vec<Taken>, Walked), Failure> {
-    let mut input = Input::open(paths, form)?;
+    let mut input = captures::open(paths, form)?;
     let mut sheet = Sheet::new(None);
     sheet.taken = Some(Default::default());
     let choice = Choice { protocol: chosen, direction: None };

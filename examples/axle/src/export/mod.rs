@@ -17,10 +17,11 @@ use std::{
 use job::Job;
 
 use crate::{
+    captures,
     decode::{self, Named, Walked},
     failure::Failure,
     help::EXIT_CODES,
-    input::{Form, Input},
+    input::Form,
     listing,
     signals::Signals,
 };
@@ -81,7 +82,7 @@ enum Format {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = format_of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(&args.files, args.form)?;
+    let mut input = captures::open(&args.files, args.form)?;
     let chosen = decode::choose(&mut input, args.protocol.0)?;
     let (output, force) = (&*args.output, args.force);
     let job = Job { input, chosen, output, force, signals };

@@ -34,7 +34,7 @@ mod svg;
 
 use crate::failure::Failure;
 #[cfg(feature = "plot")]
-use crate::{input::Input, signals::Signals};
+use crate::{captures, signals::Signals};
 pub(crate) use options::Args;
 
 /// Runs the subcommand.
@@ -42,7 +42,7 @@ pub(crate) use options::Args;
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(&args.files, args.form)?;
+    let mut input = captures::open(&args.files, args.form)?;
     args.fit(input.has_times()?)?;
     let output = output::Output::create(&args.output, args.force, &input, &signals)?;
     let (picture, walked) = read::picture(args, input, &signals)?;

@@ -7,14 +7,14 @@ use axlewire::time::Instant;
 use super::args::Args;
 use crate::{
     args::Protocol,
+    captures,
     decode::{self, Choice, Sheet},
     failure::Failure,
-    input::Input,
     listing::{self, Table},
 };
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let mut input = Input::open(&args.from.files, args.form)?;
+    let mut input = captures::open(&args.from.files, args.form)?;
     let (mut sheet, mut found) = (Sheet::new(None), args.protocol);
     sheet.wanted = args.count;
     // The times of a capture, microseconds since the first; raw bytes have none.
