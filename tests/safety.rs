@@ -141,7 +141,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
             constant(order, "HOLD_COUNTS")
         ),
         format!("again if it could not be written within {}", constant(order, "HOLD_PATIENCE")),
-        format!("no answer follows within {}, it", constant(order, "HOLD_PATIENCE")),
+        format!("no answer follows within {}, and", constant(order, "HOLD_PATIENCE")),
         format!("or {} more if", constant(order, "HOLD_PATIENCE")),
         format!("told less than {} rps looks still for good", constant(board, "STILL_RPS")),
         format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),

@@ -76,7 +76,7 @@ fn a_position_is_held_for_20_ms_after_it_was_measured_and_20_ms_longer_each_time
         assert_eq!(desk.packet(), read(NodeId::N3));
         for patience_ms in [20, 40, 60, 80] {
             desk.hear(340, &position(NodeId::N3, turns(3)));
-            let patience_us = patience_ms * 1000 + gap_us;
+            let patience_us = patience_ms * 1000 + 160 + gap_us;
             assert!(is_held_after(&mut desk.clone(), patience_us), "{patience_us} us");
             assert!(!is_held_after(&mut desk, patience_us + 1), "{patience_us} us");
         }

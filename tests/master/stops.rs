@@ -233,7 +233,7 @@ fn a_hold_behind_which_no_answer_has_come_is_looked_at_again_after_a_pause() {
 
 #[test]
 fn a_hold_that_is_kept_and_cannot_be_written_for_20_ms_is_looked_at_again() {
-    for (late_us, is_read) in [(20_000, false), (20_001, true), (3_000_000, true)] {
+    for (late_us, is_read) in [(20_160, false), (20_161, true), (3_000_000, true)] {
         let mut desk = Desk::stopping_at(manual(), turns(40));
         desk.until(NodeId::N3, StopProgress::StandingStill);
         desk.master.stop(NodeId::N3, desk.now);

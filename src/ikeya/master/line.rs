@@ -136,6 +136,11 @@ impl<B: Board> Line<B> {
         wire_time(ReadRequest::LEN, config.baud) + self.answer_time(config)
     }
 
+    /// Time of a WRITE, which is as long as an answer, and of the gap in front of it.
+    pub(super) fn write_time(&self, config: &MasterConfig) -> Duration {
+        self.answer_wire_time + config.turnaround_gap
+    }
+
     /// Time from the end of a request to the end of its window.
     fn answer_time(&self, config: &MasterConfig) -> Duration {
         config.reply_timeout + self.answer_wire_time

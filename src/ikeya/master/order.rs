@@ -16,9 +16,10 @@ use crate::{
 /// Stop WRITEs that must be followed by a good answer before a stop is confirmed.
 const CONFIRMATIONS: u8 = 2;
 
-/// Time within which a WRITE of a measured position must be followed by an answer, or the node is
-/// read again. It doubles each time, so that even on a slow line an answer eventually follows. If
-/// the WRITE has not left, it only grows by as much: a port that fails makes no hold old.
+/// Time within which a WRITE of a measured position must be followed by an answer, besides its own
+/// time on the wire, or the node is read again. It doubles each time, so that even on a slow line
+/// an answer eventually follows. If the WRITE has not left, it only grows by as much: a port that
+/// fails makes no hold old.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
 /// Minimum time between two answers that show a standstill.

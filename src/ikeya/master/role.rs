@@ -328,7 +328,7 @@ impl<B: Board> Master<B> {
             return None;
         }
         for node in &mut self.nodes {
-            node.forget_old_hold(now, self.config.turnaround_gap);
+            node.forget_old_hold(now, self.line.write_time(&self.config));
         }
         let turn = self.queue.choose(self.view())?;
         let node = &mut self.nodes[index_of(turn.node)];
@@ -377,7 +377,8 @@ impl<B: Board> Master<B> {
         self.line.sent().is_some_and(|sent| match sent.request {
             Request::Write(target) => {
                 let node = self.node(sent.turn.node);
-                !node.takes(target) || node.has_old_hold(self.now, self.config.turnaround_gap)
+                !node.takes(target)
+                    || node.has_old_hold(self.now, self.line.write_time(&self.config))
             }
             Request::Read => false,
         })
