@@ -107,6 +107,7 @@ where
         let mut out = io::stdout().lock();
         let told = listing::print_summary(&mut out, &account, false);
         told.and_then(|()| match files {
+            Some((1, only)) => writeln!(out, "{:>10} file, {only:?}", 1),
             Some((count, last)) => writeln!(out, "{count:>10} files, the last is {last:?}"),
             None => Ok(()),
         })
