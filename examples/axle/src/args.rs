@@ -159,9 +159,14 @@ pub(crate) fn seconds(text: &str) -> Result<u64, String> {
 
 /// A time of up to a minute.
 pub(crate) fn short_time(text: &str) -> Result<Duration, String> {
-    match seconds(text)?.try_into() {
-        Ok(micros @ 0..=60_000_000) => Ok(Duration::from_micros(micros)),
-        _ => Err("it is not within 0..=60 seconds".to_owned()),
+    time_within(text, 0.0)
+}
+
+/// A time from `least` seconds to a minute.
+pub(crate) fn time_within(text: &str, least: f64) -> Result<Duration, String> {
+    match seconds(text)?.try_into().map(Duration::from_micros) {
+        Ok(time) if (least..=60.0).contains(&(f64::from(time.as_micros()) / 1e6)) => Ok(time),
+        _ => Err(format!("it is not within {least}..=60 seconds")),
     }
 }
 

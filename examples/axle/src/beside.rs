@@ -101,7 +101,7 @@ impl Beside {
                     return Ok(made);
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(cannot_create(&self.path, &error)),
+                Err(error) => return Err(Failure::cannot_create(&self.path, &error)),
             }
         }
         let line = "all temporary names are taken: remove the hidden .part files beside it";
@@ -149,7 +149,7 @@ impl Beside {
         self.check()?;
         let mut temporary = self.temporary.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(from) = temporary.as_deref() else { return Err(interrupted()) };
-        let cannot = |error: io::Error| cannot_create(&self.path, &error);
+        let cannot = |error: io::Error| Failure::cannot_create(&self.path, &error);
         if matches!(self.kind, Kind::Folder(_)) && self.path.exists() {
             let mut names = (0..ATTEMPTS).map(|attempt| beside(&self.path, "old", attempt));
             let free = names.find(|name| name.as_ref().is_ok_and(|name| !name.exists()));
@@ -178,7 +178,7 @@ impl Beside {
         let cannot = |why: &str| Failure::Failed(format!("cannot create {:?}: {why}", self.path));
         match self.kind {
             _ if !self.force => {
-                Err(cannot_create(&self.path, &io::ErrorKind::AlreadyExists.into()))
+                Err(Failure::cannot_create(&self.path, &io::ErrorKind::AlreadyExists.into()))
             }
             Kind::File if known.is_file() => Ok(()),
             Kind::File => Err(cannot("it exists and is not a file")),
@@ -186,7 +186,7 @@ impl Beside {
             Kind::Folder(extension) => match not_of_export(&self.path, extension) {
                 Ok(None) => Ok(()),
                 Ok(Some(why)) => Err(cannot(&why)),
-                Err(error) => Err(cannot_create(&self.path, &error)),
+                Err(error) => Err(Failure::cannot_create(&self.path, &error)),
             },
         }
     }
@@ -233,14 +233,6 @@ pub(crate) fn interrupted() -> Failure {
 /// The failure to write this path.
 pub(crate) fn cannot_write(path: &Path, error: &dyn Display) -> Failure {
     Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
-}
-
-fn cannot_create(path: &Path, error: &io::Error) -> Failure {
-    let hint = match error.kind() {
-        io::ErrorKind::AlreadyExists => ": remove it first, or choose another name",
-        _ => "",
-    };
-    Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
 }
 
 /// A hidden name in the same folder, so that it can be renamed; another one for each attempt.

@@ -185,7 +185,7 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn begin_patiently(&mut self, nodes: NodeSet, attempts: u8) {
         let mut config = *self.master().config();
         (config.nodes, config.attempts) = (nodes, config.attempts.min(attempts));
-        (config.reply_timeout, config.late_guard) = (SLOW_TIMEOUT, SLOW_TIMEOUT);
+        config = patience::with_reply_timeout(config, SLOW_TIMEOUT);
         clock::sleep(span(SLOW_TIMEOUT));
         self.session.begin_anew(|now| Master::for_board(config, now));
     }

@@ -4,7 +4,7 @@ use core::fmt;
 use std::{
     io::{self, Write},
     panic,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
@@ -34,6 +34,15 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
+    /// The file or folder cannot be created.
+    pub(crate) fn cannot_create(path: &Path, error: &io::Error) -> Self {
+        let hint = match error.kind() {
+            io::ErrorKind::AlreadyExists => ": remove it first, or choose another name",
+            _ => "",
+        };
+        Self::Failed(format!("cannot create {path:?}: {error}{hint}"))
+    }
+
     /// This build cannot do it.
     #[cfg_attr(all(feature = "mcap", feature = "parquet", feature = "plot"), allow(dead_code))]
     pub(crate) fn without_feature(feature: &str) -> Self {

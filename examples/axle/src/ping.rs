@@ -61,11 +61,7 @@ pub(crate) struct Args {
 const DEFAULT_COUNT: u32 = 10;
 
 fn interval(text: &str) -> Result<Duration, String> {
-    let micros = args::seconds(text)?;
-    match u32::try_from(micros) {
-        Ok(micros @ 10_000..=60_000_000) => Ok(Duration::from_micros(micros)),
-        _ => Err("it is not within 0.01..=60 seconds".to_owned()),
-    }
+    args::time_within(text, 0.01)
 }
 
 /// What is measured.

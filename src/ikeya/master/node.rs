@@ -389,12 +389,12 @@ impl<B: Board> Node<B> {
         target.map_or(Request::Read, Request::Write)
     }
 
-    pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        self.order.forget_old_hold(now, gap);
+    pub(super) fn forget_old_hold(&mut self, now: Instant, write_time: Duration) {
+        self.order.forget_old_hold(now, write_time);
     }
 
-    pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
-        self.order.stop_owed().is_some_and(|stop| stop.has_old_hold(now, gap))
+    pub(super) fn has_old_hold(&self, now: Instant, write_time: Duration) -> bool {
+        self.order.stop_owed().is_some_and(|stop| stop.has_old_hold(now, write_time))
     }
 }
 

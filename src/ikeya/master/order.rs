@@ -285,9 +285,9 @@ impl<B: Board> Order<B> {
     }
 
     /// Reads the node again if no answer has come in time behind a measured position.
-    pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
+    pub(super) fn forget_old_hold(&mut self, now: Instant, write_time: Duration) {
         if let State::Stop(stop) = &mut self.state {
-            stop.forget_old_hold(now, gap);
+            stop.forget_old_hold(now, write_time);
         }
     }
 }
@@ -568,17 +568,17 @@ impl<B: Board> Stop<B> {
     }
 
     /// Reads the node again if no answer has come in time behind the measured position.
-    fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        if self.has_old_hold(now, gap) {
+    fn forget_old_hold(&mut self, now: Instant, write_time: Duration) {
+        if self.has_old_hold(now, write_time) {
             self.read_again();
         }
     }
 
-    /// Whether no answer has come in time behind the measured position, allowing for the `gap`
-    /// after each packet.
-    pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
+    /// Whether no answer has come in time behind the measured position, allowing for the
+    /// `write_time`, which includes the gap in front of the WRITE.
+    pub(super) fn has_old_hold(&self, now: Instant, write_time: Duration) -> bool {
         let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
-        is_due && now - self.measured_at > self.patience + gap
+        is_due && now - self.measured_at > self.patience + write_time
     }
 
     fn read_again(&mut self) {

@@ -26,19 +26,14 @@ const FITTING: [(u32, Patience); 3] =
     [(350, Patience::Direct), (17_000, Patience::Usb), (70_000, Patience::Network)];
 
 impl Patience {
-    /// Settings of a master. A late answer may be that late as well.
+    /// Settings of a master.
     pub(crate) fn config(self) -> MasterConfig {
-        let mut config = match self {
-            Self::Direct => return MasterConfig::direct(),
-            Self::Usb | Self::Network | Self::For(_) => MasterConfig::usb_adapter(),
-        };
-        let timeout = match self {
-            Self::Network => Duration::from_millis(100),
-            Self::For(timeout) => timeout,
-            Self::Direct | Self::Usb => return config,
-        };
-        (config.reply_timeout, config.late_guard) = (timeout, timeout);
-        config
+        match self {
+            Self::Direct => MasterConfig::direct(),
+            Self::Usb => MasterConfig::usb_adapter(),
+            Self::Network => with_reply_timeout(Self::Usb.config(), Duration::from_millis(100)),
+            Self::For(timeout) => with_reply_timeout(Self::Usb.config(), timeout),
+        }
     }
 
     /// What a line needs on which the slowest answer took this long; otherwise half of it more, in
@@ -54,6 +49,15 @@ impl Patience {
             |(_, patience)| patience,
         )
     }
+}
+
+/// A late answer may be that late as well.
+pub(super) const fn with_reply_timeout(
+    mut config: MasterConfig,
+    timeout: Duration,
+) -> MasterConfig {
+    (config.reply_timeout, config.late_guard) = (timeout, timeout);
+    config
 }
 
 impl FromStr for Patience {

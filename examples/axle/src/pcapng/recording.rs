@@ -112,7 +112,8 @@ impl Recording {
         } else {
             Output::File(create(path, force)?)
         };
-        Self::begin(output, path, protocol, port, baud).map_err(|error| cannot(path, &error))
+        Self::begin(output, path, protocol, port, baud)
+            .map_err(|error| Failure::cannot_create(path, &error))
     }
 
     /// Creates the first of several files. Each has its number and time in its name, as those of
@@ -354,15 +355,7 @@ fn create(path: &Path, force: bool) -> Result<File, Failure> {
         true => options.create(true).truncate(true),
         false => options.create_new(true),
     };
-    options.open(path).map_err(|error| cannot(path, &error))
-}
-
-fn cannot(path: &Path, error: &io::Error) -> Failure {
-    let hint = match error.kind() {
-        io::ErrorKind::AlreadyExists => ": remove it first, or choose another name",
-        _ => "",
-    };
-    Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
+    options.open(path).map_err(|error| Failure::cannot_create(path, &error))
 }
 
 /// Writes, and counts the bytes that were written before a failure.

@@ -28,10 +28,7 @@ use wheels::Wheels;
 
 /// Sends the frames of a plan.
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
-    hidden::refuse(&plan)?;
-    for note in &plan.notes {
-        eprintln!("axle: {note}");
-    }
+    announce(&plan)?;
     let signals = Signals::listen_to_all()?;
     let result =
         plan.bus.open(plan.protocol).and_then(|line| play_on(plan, line, Teller::new(), &signals));
@@ -41,10 +38,18 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
 
 /// Lists the frames of a plan, at their times, without a port.
 pub(crate) fn list(plan: &Plan<'_>) -> Result<(), Failure> {
-    hidden::refuse(plan)?;
+    announce(plan)?;
     let mut out = io::stdout().lock();
-    plan.notes.iter().for_each(|note| eprintln!("axle: {note}"));
     lister::list(plan, &mut out).and_then(|()| out.flush()).map_err(Failure::Write)
+}
+
+/// Refuses a plan that would do harm, and says what is not as one would expect.
+fn announce(plan: &Plan<'_>) -> Result<(), Failure> {
+    hidden::refuse(plan)?;
+    for note in &plan.notes {
+        eprintln!("axle: {note}");
+    }
+    Ok(())
 }
 
 fn play_on(plan: Plan<'_>, line: Line, teller: Teller, signals: &Signals) -> Result<(), Failure> {
