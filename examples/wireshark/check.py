@@ -55,10 +55,10 @@ def block(kind, body):
     return struct.pack("<I", kind) + length + body + length
 
 
-def pcapng(interfaces, packets):
+def pcapng(interfaces, packets, now=1_700_000_000_123_456):
     """A capture: protocol and port of each interface; of each packet its interface, direction, µs
     since the one before, and bytes."""
-    file, now = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1)), 1_700_000_000_123_456
+    file = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
     for protocol, port in interfaces:
         file += block(1, struct.pack("<HHI", LINK_TYPES[protocol], 0, 0) + option(2, port.encode())
                       + option(9, b"\6") + bytes(4))

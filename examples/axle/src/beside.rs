@@ -209,12 +209,43 @@ fn not_of_export(folder: &Path, extension: &str) -> io::Result<Option<String>> {
         let file = file?;
         let (name, kind) = (file.file_name(), file.file_type()?);
         let table = name.to_str().and_then(|it| it.strip_suffix(extension)?.strip_suffix('.'));
-        let is_ours = name == LIST || table.is_some_and(|table| tables.contains(table));
-        if !is_ours || !kind.is_file() {
+        let is_table = table.is_some_and(|table| tables.contains(table));
+        let is_ours = match (kind.is_file(), kind.is_dir()) {
+            (true, _) => is_table || name == LIST,
+            (_, true) => is_table && has_only(&file.path(), &["day=", "line="], extension)?,
+            _ => false,
+        };
+        if !is_ours {
             return Ok(Some(format!("{name:?} in it is not of an export")));
         }
     }
     Ok(None)
+}
+
+/// Whether a folder has numbered files with this extension, below folders whose names begin like
+/// this, and nothing else.
+fn has_only(folder: &Path, levels: &[&str], extension: &str) -> io::Result<bool> {
+    let mut has_some = false;
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let (name, kind) = (entry.file_name(), entry.file_type()?);
+        let name = name.to_str().unwrap_or_default();
+        let is_ours = match levels.split_first() {
+            Some((first, rest)) if kind.is_dir() && name.starts_with(first) => {
+                has_only(&entry.path(), rest, extension)?
+            }
+            Some(_) => false,
+            None => {
+                let number = name.strip_suffix(extension).and_then(|it| it.strip_suffix('.'));
+                kind.is_file() && number.is_some_and(|it| it.parse::<u64>().is_ok())
+            }
+        };
+        if !is_ours {
+            return Ok(false);
+        }
+        has_some = true;
+    }
+    Ok(has_some)
 }
 
 impl Drop for Beside {
@@ -262,7 +293,7 @@ mod tests {
     #[test]
     fn what_another_process_of_the_same_number_has_left_is_no_obstacle() {
         let path = std::env::temp_dir().join(format!("axle-{}-beside.jsonl", process::id()));
-        let input = Input::open(Vec::new(), Form::default()).unwrap();
+        let input = Input::open(Vec::new(), None, Form::default()).unwrap();
         let left = beside(&path, "part", 0).unwrap();
         fs::write(&left, "left").unwrap();
         let (second, file) = Beside::file(&path, false, &input).unwrap();
@@ -283,7 +314,7 @@ mod tests {
         for attempt in 0..ATTEMPTS {
             fs::create_dir(beside(&path, "part", attempt).unwrap()).unwrap();
         }
-        let input = Input::open(Vec::new(), Form::default()).unwrap();
+        let input = Input::open(Vec::new(), None, Form::default()).unwrap();
         let failure = Beside::folder(&path, false, "csv", &input).unwrap_err();
         assert!(failure.to_string().contains("remove the hidden .part files"), "{failure}");
         fs::remove_dir_all(folder).unwrap();

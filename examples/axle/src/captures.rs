@@ -16,7 +16,20 @@ const EXTENSIONS: [&str; 4] = [".pcapng", ".pcap", ".pcapng.gz", ".pcap.gz"];
 
 /// Opens files and folders of captures, or standard input for none and `-`.
 pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
-    Input::open(in_order(paths, form)?, form)
+    let is_collection = paths.len() > 1 || paths.iter().any(|path| path.is_dir());
+    let files = in_order(paths, form)?;
+    let root = is_collection.then(|| folder_of_all(&files));
+    Input::open(files, root, form)
+}
+
+/// The folder that all files are in or below.
+fn folder_of_all(files: &[PathBuf]) -> PathBuf {
+    let mut parents = files.iter().filter_map(|file| file.parent());
+    let mut root = parents.next().unwrap_or_else(|| Path::new("")).to_owned();
+    for parent in parents {
+        while !parent.starts_with(&root) && root.pop() {}
+    }
+    root
 }
 
 /// The files, in the order of the times of their first packets, and then of their names. Several

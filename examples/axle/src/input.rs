@@ -56,23 +56,38 @@ pub(crate) struct Input {
     /// The files behind this one, and all of them.
     rest: VecDeque<PathBuf>,
     all: Vec<PathBuf>,
+    /// The folder that holds all of a collection; `None` for a single capture.
+    root: Option<PathBuf>,
 }
 
 impl Input {
-    /// Opens these files, one at a time; or standard input for none and `-`.
-    pub(crate) fn open(all: Vec<PathBuf>, form: Form) -> Result<Self, Failure> {
+    /// Opens these files, one at a time; or standard input for none and `-`. `root` is the folder
+    /// that holds all of a collection.
+    pub(crate) fn open(
+        all: Vec<PathBuf>,
+        root: Option<PathBuf>,
+        form: Form,
+    ) -> Result<Self, Failure> {
         let mut rest = VecDeque::from(all.clone());
         let first = rest.pop_front();
         let mut input = Self::open_one(first.as_deref(), form)?;
         if !rest.is_empty() {
             (input.file, input.progress) = (None, None);
         }
-        Ok(Self { rest, all, ..input })
+        Ok(Self { rest, all, root, ..input })
     }
 
-    /// Whether there are several files.
-    pub(crate) fn is_one_of_several(&self) -> bool {
-        self.all.len() > 1
+    /// Whether there are several files, or a folder of them.
+    pub(crate) const fn is_of_a_collection(&self) -> bool {
+        self.root.is_some()
+    }
+
+    /// The folders between that of the collection and the file.
+    pub(crate) fn folder(&self) -> &Path {
+        let parent = self.path.as_deref().and_then(Path::parent);
+        let below =
+            parent.zip(self.root.as_deref()).and_then(|(it, root)| it.strip_prefix(root).ok());
+        below.unwrap_or_else(|| Path::new(""))
     }
 
     /// Goes on with the next file; `false` if this was the last.
@@ -80,7 +95,8 @@ impl Input {
         let Some(path) = self.rest.pop_front() else { return Ok(false) };
         let next = Self::open_one(Some(&path), self.form)?;
         let (rest, all) = (mem::take(&mut self.rest), mem::take(&mut self.all));
-        *self = Self { rest, all, file: None, progress: None, ..next };
+        let root = self.root.take();
+        *self = Self { rest, all, root, file: None, progress: None, ..next };
         Ok(true)
     }
 
@@ -124,6 +140,7 @@ impl Input {
             form,
             rest,
             all,
+            root: None,
         }
     }
 

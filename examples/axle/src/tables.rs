@@ -7,6 +7,8 @@ mod column;
 mod described;
 mod row;
 
+use std::{collections::BTreeMap, mem, rc::Rc};
+
 use axlewire::fields::Shape;
 
 use crate::{
@@ -27,11 +29,31 @@ use row::{Row, Slot};
 /// Rows of a table after which they go to the sink.
 const BATCH: usize = 64 * 1024;
 
+/// Partitions after which all rows go to the sink.
+const MOST_PARTITIONS: usize = 32;
+
+const DAY_US: u64 = 24 * 60 * 60 * 1_000_000;
+
 /// Takes in the rows of all tables.
 pub(crate) trait Sink {
     /// Takes in the next rows of a table. They are in the order of `axle decode --json`, which is
     /// [`Table::numbers`]; rows of other tables may come earlier or later.
     fn rows(&mut self, table: &Table) -> Result<(), Failure>;
+
+    /// Whether each day and line has tables of its own. The rows of a table are then in order
+    /// within their partition.
+    fn takes_partitions(&self) -> bool {
+        false
+    }
+}
+
+/// Which rows a table has, if not all.
+#[derive(Clone, Debug, Default, Eq, Ord, PartialEq, PartialOrd)]
+pub(crate) struct Partition {
+    /// Day since 1970, UTC; `None` for rows without a time.
+    pub(crate) day: Option<u64>,
+    /// Name of the line.
+    pub(crate) line: Rc<str>,
 }
 
 /// Rows of one message.
@@ -43,6 +65,8 @@ pub(crate) struct Table {
     pub(crate) protocol: Option<Protocol>,
     /// Name of the message; `skipped` for the gaps.
     pub(crate) message: &'static str,
+    /// `None` if it has all rows of the message.
+    pub(crate) partition: Option<Partition>,
     pub(crate) columns: Vec<Column>,
     /// The number of each row among the frames and gaps of the capture, from 0.
     pub(crate) numbers: Vec<u64>,
@@ -53,8 +77,13 @@ pub(crate) struct Table {
 /// All tables.
 #[derive(Debug)]
 pub(crate) struct Tables {
-    /// By protocol; then the gaps.
+    /// By protocol; then the gaps. Those of the last row, if there are partitions.
     all: Vec<Table>,
+    /// The partition of the last row, if there are such, and the tables of the others.
+    partition: Option<Partition>,
+    others: BTreeMap<Partition, Vec<Table>>,
+    /// The line of the next row.
+    line: Rc<str>,
     /// The first of each protocol.
     first: [usize; 3],
     /// The table of the last frame: the next is often of the same message.
@@ -62,6 +91,8 @@ pub(crate) struct Tables {
     has_times: bool,
     /// Frames and gaps so far.
     count: u64,
+    /// Rows since the last ones went to the sink.
+    held: usize,
     /// Whether some table has a batch.
     is_full: bool,
     unfit: Option<Unfit>,
@@ -75,17 +106,39 @@ const PLACE: [&str; 4] = ["offset", "t", "interface", "direction"];
 
 impl Tables {
     /// Empty tables. Without times there are no columns of time, interface and direction.
-    pub(crate) fn new(has_times: bool) -> Self {
-        let described = described::all().into_iter();
-        let mut all: Vec<_> = described.map(|it| Table::new(it, has_times)).collect();
-        let place = |table: &Table| table.protocol.map_or(3, |protocol| protocol as usize);
-        all.sort_by_key(place);
+    pub(crate) fn new(has_times: bool, in_partitions: bool) -> Self {
+        let partition = in_partitions.then(Partition::default);
+        let all = empty(has_times, partition.as_ref());
         let first = [0, 1, 2].map(|protocol| all.partition_point(|it| place(it) < protocol));
-        Self { all, first, last: 0, has_times, count: 0, is_full: false, unfit: None }
+        let (others, line) = (BTreeMap::new(), "".into());
+        let (last, count, held, is_full, unfit) = (0, 0, 0, false, None);
+        Self { all, partition, others, line, first, last, has_times, count, held, is_full, unfit }
+    }
+
+    /// What follows is of the line with this name.
+    pub(crate) fn turn_to(&mut self, line: &Rc<str>) {
+        if self.partition.is_some() && self.line != *line {
+            self.line = Rc::clone(line);
+        }
+    }
+
+    /// Lays out the tables of the partition in which a row with this time is.
+    fn turn_to_day(&mut self, micros: Option<u64>) {
+        let Some(last) = &mut self.partition else { return };
+        let day = micros.map(|micros| micros / DAY_US);
+        if last.day == day && last.line == self.line {
+            return;
+        }
+        let next = Partition { day, line: Rc::clone(&self.line) };
+        let known = self.others.remove(&next);
+        let tables = known.unwrap_or_else(|| empty(self.has_times, Some(&next)));
+        self.others.insert(mem::replace(last, next), mem::replace(&mut self.all, tables));
+        self.is_full |= self.others.len() >= MOST_PARTITIONS;
     }
 
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
+        self.turn_to_day(at.micros);
         let name = frame.name();
         let is_its = |table: &Table| (table.protocol, table.message) == (Some(S::PROTOCOL), name);
         if !self.all.get(self.last).is_some_and(is_its) {
@@ -106,6 +159,7 @@ impl Tables {
 
     /// Adds a gap.
     pub(crate) fn gap(&mut self, at: Place, gap: &SkippedBytes) {
+        self.turn_to_day(at.micros);
         let Some(last) = self.all.iter().position(|table| table.protocol.is_none()) else { return };
         let added = self.add(last, at, |table, from| {
             let mut columns = table.columns.iter_mut().skip(from);
@@ -146,7 +200,8 @@ impl Tables {
         }
         table.numbers.push(number);
         self.count += 1;
-        self.is_full |= rows + 1 >= BATCH;
+        self.held += 1;
+        self.is_full |= rows + 1 >= BATCH || (self.partition.is_some() && self.held >= BATCH);
         Ok(())
     }
 
@@ -154,7 +209,9 @@ impl Tables {
     pub(crate) fn give_full(&mut self, sink: &mut dyn Sink) -> Result<(), Failure> {
         if self.is_full {
             self.is_full = false;
-            self.give(BATCH, sink)?;
+            // A partition that is over gets no full batch.
+            self.give(if self.partition.is_some() { 1 } else { BATCH }, sink)?;
+            self.others.clear();
         }
         self.unfit.map_or(Ok(()), |_| Err(bug()))
     }
@@ -166,7 +223,8 @@ impl Tables {
     }
 
     fn give(&mut self, least: usize, sink: &mut dyn Sink) -> Result<(), Failure> {
-        for table in &mut self.all {
+        self.held = 0;
+        for table in self.others.values_mut().flatten().chain(&mut self.all) {
             if table.numbers.len() >= least {
                 sink.rows(table)?;
                 table.numbers.clear();
@@ -177,8 +235,21 @@ impl Tables {
     }
 }
 
+/// Empty tables, by protocol.
+fn empty(has_times: bool, partition: Option<&Partition>) -> Vec<Table> {
+    let described = described::all().into_iter();
+    let mut all: Vec<_> = described.map(|it| Table::new(it, has_times, partition)).collect();
+    all.sort_by_key(place);
+    all
+}
+
+/// Where its protocol is among all; gaps are last.
+fn place(table: &Table) -> usize {
+    table.protocol.map_or(3, |protocol| protocol as usize)
+}
+
 impl Table {
-    fn new(of: Described, has_times: bool) -> Self {
+    fn new(of: Described, has_times: bool, partition: Option<&Partition>) -> Self {
         let (mut columns, mut slots, mut place) = (Vec::new(), Vec::new(), 0);
         for (field, names) in of.fields {
             let name = field.name;
@@ -203,7 +274,8 @@ impl Table {
         }
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
-        Self { name, protocol, message, columns, numbers, slots }
+        let partition = partition.cloned();
+        Self { name, protocol, message, partition, columns, numbers, slots }
     }
 
     /// Fills the columns of a place, and returns their number.

@@ -17,16 +17,20 @@ import sys
 import tempfile
 from pathlib import Path
 
+import duckdb
 import jsonschema
 import pyarrow.parquet
 from mcap.reader import make_reader
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "examples/sigrok"))
+sys.path[:0] = [str(ROOT / "examples/wireshark"), str(ROOT / "examples/sigrok")]
+import check
 import make
 
 AXLE = Path(os.environ.get("AXLE") or ROOT / "target/debug/axle").resolve()
 LEAST_VALUES = 180_000
+# The fleet: so many captures in all.
+ROVERS, DAYS, FIRST_DAY = 20, 50, datetime.date(2026, 1, 1)
 TYPES = {"u8": pyarrow.uint8(), "i16": pyarrow.int16(), "u16": pyarrow.uint16(),
          "u32": pyarrow.uint32(), "u64": pyarrow.uint64(), "f32": pyarrow.float32(),
          "time": pyarrow.timestamp("us", "UTC"), "name": pyarrow.string(),
@@ -48,6 +52,22 @@ def inputs(folder):
             path = folder / f"{name}-{protocol}.bin"
             path.write_bytes(b"".join(parts))
             yield path, ["--protocol", protocol]
+
+
+def fleet(folder):
+    """A capture for each rover and day: some packets, an hour between each two, and one a minute
+    after the midnight that follows."""
+    frames = make.vectors("ucp")[:8]
+    for rover in range(1, ROVERS + 1):
+        (folder / f"rover-{rover}").mkdir(parents=True)
+        for day in range(DAYS):
+            date = FIRST_DAY + datetime.timedelta(day)
+            begin = (date - datetime.date(1970, 1, 1)).days * 24 * 3600 * 1_000_000
+            hours = [1] * rover + [24 - rover + 1 / 60]
+            packets = [(0, 1, round(step * 3_600_000_000), frames[at % len(frames)])
+                       for at, step in enumerate(hours)]
+            capture = check.pcapng([("ucp", "/dev/ttyS4")], packets, begin)
+            (folder / f"rover-{rover}/{date}.pcapng").write_bytes(capture)
 
 
 def micros_of(text):
@@ -174,6 +194,32 @@ class Check:
             faults = validators[schema.id].iter_errors(json.loads(message.data))
             self.expect(f"{where}: schema", [fault.message for fault in faults], [])
 
+    def fleet(self):
+        """Each frame of a fleet is in the partition of its day and line, and nowhere else."""
+        fleet(self.folder / "fleet")
+        out = self.folder / "whole.parquet"
+        subprocess.run([AXLE, "export", self.folder / "fleet", "-o", out], check=True,
+                       stdout=subprocess.DEVNULL)
+        wanted, found = {}, {}
+        for path in (self.folder / "fleet").glob("*/*.pcapng"):
+            lines = subprocess.run([AXLE, "decode", "--json", path], stdout=subprocess.PIPE,
+                                   check=True).stdout.splitlines()
+            for line in map(json.loads, lines):
+                if line["event"] in ("frame", "skipped"):
+                    date = datetime.datetime.fromtimestamp(line["t"], datetime.UTC).date()
+                    key = (table_of(line), date, f"{path.parent.name}/ttyS4", line["t"])
+                    wanted[key] = wanted.get(key, 0) + 1
+        self.expect("fleet: frames", sum(wanted.values()) >= 1000, True)
+        for table in {key[0] for key in wanted}:
+            files = f"{out}/{table}.parquet/**/*.parquet"
+            rows = duckdb.sql(f"SELECT day, line, epoch_us(t) FROM '{files}'")
+            for day, line, micros in rows.fetchall():
+                key = (table, day, line, micros / 1e6)
+                found[key] = found.get(key, 0) + 1
+        self.expect("fleet: rows", found, wanted)
+        days, lines = ({key[at] for key in wanted} for at in (1, 2))
+        self.expect("fleet: days and lines", (len(days), len(lines)), (DAYS + 1, ROVERS))
+
     def page(self):
         """The snippets of export.md print what is there, in a folder with what they write."""
         page, count = (ROOT / "examples/axle/export.md").read_text(), 0
@@ -207,6 +253,7 @@ def main():
         check = Check(Path(folder))
         for path, options in inputs(check.folder):
             check.capture(path, options)
+        check.fleet()
         check.page()
     print(f"{check.values} values of {check.lines} frames and gaps: "
           f"{len(check.differences)} differences")

@@ -359,6 +359,59 @@ fn a_packet_with_an_impossible_time_has_none_and_it_is_said() {
     }
 }
 
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_of_a_folder_has_a_file_per_table_day_and_line_and_is_replaced_as_a_whole() {
+    const DAY_US: u64 = 86_400_000_000;
+    let folder = folder("fleet");
+    let read = bytes("aa01bed0");
+    for (rover, times) in [("a/b", &[0, DAY_US, 1][..]), ("c", &[DAY_US - 1, u64::MAX])] {
+        let packets: Vec<_> = times.iter().map(|at| (*at, 1, &read[..])).collect();
+        fs::create_dir_all(folder.join("in").join(rover)).unwrap();
+        fs::write(folder.join("in").join(rover).join("x.pcapng"), PcapNg::new(147, &packets).0)
+            .unwrap();
+    }
+    let from = folder.join("in");
+    let to = folder.join("out.parquet");
+    let table = to.join("ikeya.read_request.parquet");
+    for more in [&[][..], &["--force"]] {
+        let output = export(from.to_str().unwrap(), &[], &to, more);
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        let mut found = Vec::new();
+        for day in names(&table) {
+            for line in names(&table.join(&day)) {
+                let files = names(&table.join(&day).join(&line)).len();
+                found.push(format!("{day}/{line}: {files}"));
+            }
+        }
+        let expected = [
+            "day=1970-01-01/line=a%2Fb%2Ftty0: 1",
+            "day=1970-01-01/line=c%2Ftty0: 1",
+            "day=1970-01-02/line=a%2Fb%2Ftty0: 1",
+            "day=__HIVE_DEFAULT_PARTITION__/line=c%2Ftty0: 1",
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(names(&to), ["columns.csv", "ikeya.read_request.parquet"]);
+    }
+    // What is not of an export stays.
+    for foreign in ["x.odt", "day=1970-01-01/x", "day=1970-01-01/line=c%2Ftty0/x.parquet"] {
+        fs::write(table.join(foreign), "years of work").unwrap();
+        let line = complaint(&export(from.to_str().unwrap(), &[], &to, &["--force"]), 1);
+        assert!(
+            line.ends_with("\"ikeya.read_request.parquet\" in it is not of an export"),
+            "{line}"
+        );
+        fs::remove_file(table.join(foreign)).unwrap();
+    }
+    // A folder of one capture is one, too; a file is none.
+    let one = folder.join("in/c");
+    assert!(export(one.to_str().unwrap(), &[], &to, &["--force"]).status.success());
+    assert_eq!(names(&table.join("day=1970-01-01")), ["line=tty0"]);
+    let file = one.join("x.pcapng");
+    assert!(export(file.to_str().unwrap(), &[], &to, &["--force"]).status.success());
+    assert!(table.is_file());
+}
+
 #[cfg(unix)]
 mod unix {
     use std::{

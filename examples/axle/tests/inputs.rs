@@ -195,6 +195,22 @@ fn several_files_and_a_folder_are_one_capture_in_the_order_of_time() {
 }
 
 #[test]
+fn two_lines_of_one_name_in_a_file_of_several_are_not_mixed() {
+    let (folder, path) = set("names");
+    let frame = Ping {}.frame(0);
+    let (front, back) = frame.as_bytes().split_at(3);
+    let mut file = PcapNg::new(150, &[]);
+    file.interface(150);
+    for (at, part) in [front, front, back, back].into_iter().enumerate() {
+        file.packet(at as u32 % 2, (4_000_000 + at as u64, 1, part));
+    }
+    fs::write(folder.join("d.pcapng"), file.0).unwrap();
+    let output = axle(&["decode", &path]).output().unwrap();
+    let listing = String::from_utf8(output.stdout).unwrap();
+    assert!(listing.contains(" in 11 frames\n         0 skipped"), "{listing}");
+}
+
+#[test]
 fn a_bad_file_among_several_is_named_and_costs_nothing_of_the_others() {
     let (folder, path) = set("bad-set");
     let cut = fs::read(folder.join("c.pcapng")).unwrap();

@@ -1,6 +1,9 @@
 //! The events of one stream of bytes, as lines.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::{
+    collections::{BTreeSet, VecDeque},
+    rc::Rc,
+};
 
 use axlewire::{
     ikeya::NodeId,
@@ -75,6 +78,13 @@ impl Sheet {
             table: None,
             tables: None,
             wanted: None,
+        }
+    }
+
+    /// What follows is of the line with this name.
+    pub(super) fn turn_to(&mut self, line: &Rc<str>) {
+        if let Some(tables) = &mut self.tables {
+            tables.turn_to(line);
         }
     }
 

@@ -1,6 +1,10 @@
 //! All packets of a capture, with times or without, each fed to the stream it belongs to.
 
-use std::collections::{BTreeMap, btree_map::Entry};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    path::Path,
+    rc::Rc,
+};
 
 use axlewire::stream::Counters;
 
@@ -91,7 +95,7 @@ pub(crate) fn walk(
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
     let (lines, walked) = (BTreeMap::new(), Walked::default());
-    let ports = input.is_one_of_several().then(Vec::new);
+    let ports = input.is_of_a_collection().then(Vec::new);
     let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, go_on };
     let result = match input.has_times() {
         Ok(true) => walk.packets(input, sheet),
@@ -113,16 +117,22 @@ struct Walk<G> {
     /// Packets so far, and the time of the last one.
     number: u64,
     latest: u64,
-    /// In several files: the port and link type of each interface. The numbers of the files do not
-    /// tell the lines apart.
-    ports: Option<Vec<(Option<String>, u16)>>,
+    /// In a collection: what each interface is. The numbers of the files do not tell the lines
+    /// apart.
+    ports: Option<Vec<Port>>,
     go_on: G,
 }
+
+/// An interface as its files describe it: its name, link type and number there. Two of one name in
+/// a file are two lines.
+type Port = (Option<String>, u16, usize);
 
 /// What an interface was connected to.
 struct Line {
     protocol: Protocol,
     interface: Option<usize>,
+    /// What tells it apart in a collection.
+    name: Rc<str>,
     /// Both directions have the same nodes.
     modes: Modes,
     streams: BTreeMap<Option<Direction>, Box<dyn Stream>>,
@@ -139,7 +149,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
 
     /// The packets of a file; returns whether to go on.
     fn packets_of_one(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<bool, Failure> {
-        let path = input.path().map(ToOwned::to_owned);
+        let (path, folder) = (input.path().map(ToOwned::to_owned), input.folder().to_owned());
         let mut reader = Reader::new(input);
         let (mut section, mut last) = (0, None);
         loop {
@@ -174,7 +184,8 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         None => protocol_of(&packet)?,
                     };
                     self.choice.permits(protocol)?;
-                    new.insert(Line::new(protocol, Some(interface)))
+                    let name = name_of(&folder, &packet);
+                    new.insert(Line::new(protocol, Some(interface), name))
                 }
             };
             let micros = self.walked.time(packet.micros, self.number);
@@ -203,7 +214,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
             return Err(Failure::Usage(line.to_owned()));
         };
         self.choice.permits(protocol)?;
-        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None));
+        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, "".into()));
         loop {
             let bytes = match input.read() {
                 Ok([]) => return Ok(()),
@@ -240,8 +251,8 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
 }
 
 impl Line {
-    fn new(protocol: Protocol, interface: Option<usize>) -> Self {
-        Self { protocol, interface, modes: Modes::default(), streams: BTreeMap::new() }
+    fn new(protocol: Protocol, interface: Option<usize>, name: Rc<str>) -> Self {
+        Self { protocol, interface, name, modes: Modes::default(), streams: BTreeMap::new() }
     }
 
     fn feed(
@@ -257,6 +268,7 @@ impl Line {
             .entry(direction)
             .or_insert_with(|| choice.stream(self.protocol, self.interface, direction));
         core::mem::swap(&mut self.modes, &mut sheet.modes);
+        sheet.turn_to(&self.name);
         stream.feed(bytes, micros, sheet);
         core::mem::swap(&mut self.modes, &mut sheet.modes);
     }
@@ -265,6 +277,7 @@ impl Line {
     fn finish(&mut self, sheet: &mut Sheet) -> Counters {
         let mut account = Counters::default();
         core::mem::swap(&mut self.modes, &mut sheet.modes);
+        sheet.turn_to(&self.name);
         for stream in self.streams.values_mut() {
             stream.finish(sheet);
             account += stream.counters();
@@ -274,9 +287,20 @@ impl Line {
     }
 }
 
+/// Its name in a collection: the folders of the file, if not all are in the same, and the port.
+fn name_of(folder: &Path, packet: &Packet<'_>) -> Rc<str> {
+    let port = match &packet.described.name {
+        Some(name) => name.strip_prefix("/dev/").unwrap_or(name).to_owned(),
+        None => format!("interface {}", packet.interface),
+    };
+    let parts = folder.iter().map(|part| part.to_string_lossy().into_owned());
+    parts.chain([port]).collect::<Vec<_>>().join("/").into()
+}
+
 /// The number of its port.
-fn number_of(ports: &mut Vec<(Option<String>, u16)>, packet: &Packet<'_>) -> usize {
-    let port = (packet.described.name.clone(), packet.described.link_type);
+fn number_of(ports: &mut Vec<Port>, packet: &Packet<'_>) -> usize {
+    let Packet { described, interface, .. } = packet;
+    let port = (described.name.clone(), described.link_type, *interface);
     let known = ports.iter().position(|known| *known == port);
     known.unwrap_or_else(|| {
         ports.push(port);

@@ -80,7 +80,7 @@ pub(crate) fn walk_into(
     mut go_on: impl FnMut() -> Result<(), Failure>,
 ) -> Result<Walked, Failure> {
     let mut sheet = Sheet::new(None);
-    sheet.tables = Some(Tables::new(chosen.has_times));
+    sheet.tables = Some(Tables::new(chosen.has_times, sink.takes_partitions()));
     let walked = chosen.walk(input, &mut sheet, |_, sheet| {
         go_on()?;
         sheet.tables.as_mut().map_or(Ok(()), |tables| tables.give_full(sink))

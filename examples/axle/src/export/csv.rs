@@ -17,6 +17,8 @@ pub(super) struct Csv(BufWriter<File>);
 impl TableFile for Csv {
     const EXTENSION: &'static str = "csv";
 
+    const TAKES_PARTITIONS: bool = false;
+
     type Error = io::Error;
 
     fn create(path: &Path, table: &Table) -> io::Result<Self> {

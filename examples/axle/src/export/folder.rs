@@ -3,9 +3,11 @@
 use std::{
     collections::BTreeMap,
     fmt::Display,
-    fs::File,
+    fs::{self, File},
     io::{self, Write},
+    mem,
     path::{Path, PathBuf},
+    time::{Duration, UNIX_EPOCH},
 };
 
 use super::job::Job;
@@ -13,13 +15,16 @@ use crate::{
     beside::{Beside, COLUMNS, LIST, cannot_write},
     decode::{self, Walked},
     failure::Failure,
-    tables::{Column, Sink, Table},
+    tables::{Column, Partition, Sink, Table},
 };
 
 /// The file of one table.
 pub(super) trait TableFile: Sized {
     /// Its extension and that of the folder.
     const EXTENSION: &'static str;
+
+    /// Whether a table of a collection is a folder, with files for each day and line.
+    const TAKES_PARTITIONS: bool;
 
     type Error: Display;
 
@@ -35,7 +40,8 @@ pub(super) trait TableFile: Sized {
 pub(super) fn export<F: TableFile>(mut job: Job<'_>) -> Result<Walked, Failure> {
     let (beside, path) = Beside::folder(job.output, job.force, F::EXTENSION, &job.input)?;
     beside.end_on(&job.signals);
-    let mut folder = Folder::<F>::new(path, job.output);
+    let in_partitions = F::TAKES_PARTITIONS && job.input.is_of_a_collection();
+    let mut folder = Folder::<F>::new(path, job.output, in_partitions);
     let go_on = || Job::go_on(&job.signals);
     let walked = decode::walk_into(&mut job.input, &job.chosen, &mut folder, go_on)?;
     folder.finish()?;
@@ -43,42 +49,92 @@ pub(super) fn export<F: TableFile>(mut job: Job<'_>) -> Result<Walked, Failure> 
     Ok(walked)
 }
 
+/// Files that are open at a time: systems allow 256 or more.
+const MOST_OPEN: usize = 200;
+
 pub(super) struct Folder<'a, F> {
     path: PathBuf,
     /// The name that it will have.
     output: &'a Path,
-    /// By the name of the table: its lines in the list of columns, and its file.
-    files: BTreeMap<String, (String, F)>,
+    in_partitions: bool,
+    /// By the name of the table: its lines in the list of columns.
+    lists: BTreeMap<String, String>,
+    /// The files that are open, and how many were begun.
+    files: BTreeMap<(String, Option<Partition>), F>,
+    begun: usize,
 }
 
 impl<F: TableFile> Sink for Folder<'_, F> {
     fn rows(&mut self, table: &Table) -> Result<(), Failure> {
-        let cannot = |error| cannot_write(self.output, &error);
-        if !self.files.contains_key(&table.name) {
-            let path = self.path.join(format!("{}.{}", table.name, F::EXTENSION));
-            let file = F::create(&path, table).map_err(cannot)?;
-            self.files.insert(table.name.clone(), (listed(table), file));
+        let key = (table.name.clone(), table.partition.clone());
+        if !self.files.contains_key(&key) {
+            let file = self.begin(table)?;
+            self.files.insert(key.clone(), file);
         }
-        let Some((_, file)) = self.files.get_mut(&table.name) else { return Ok(()) };
-        file.add(table).map_err(cannot)
+        let Some(file) = self.files.get_mut(&key) else { return Ok(()) };
+        file.add(table).map_err(|error| cannot_write(self.output, &error))
+    }
+
+    fn takes_partitions(&self) -> bool {
+        self.in_partitions
     }
 }
 
 impl<'a, F: TableFile> Folder<'a, F> {
-    pub(super) fn new(path: PathBuf, output: &'a Path) -> Self {
-        Self { path, output, files: BTreeMap::new() }
+    pub(super) fn new(path: PathBuf, output: &'a Path, in_partitions: bool) -> Self {
+        let (lists, files) = (BTreeMap::new(), BTreeMap::new());
+        Self { path, output, in_partitions, lists, files, begun: 0 }
+    }
+
+    fn begin(&mut self, table: &Table) -> Result<F, Failure> {
+        if self.files.len() >= MOST_OPEN {
+            self.end_files()?;
+        }
+        self.lists.entry(table.name.clone()).or_insert_with(|| listed(table));
+        let mut path = self.path.join(format!("{}.{}", table.name, F::EXTENSION));
+        if let Some(partition) = &table.partition {
+            path.push(folders_of(partition));
+            fs::create_dir_all(&path).map_err(|error| cannot_write(self.output, &error))?;
+            path.push(format!("{}.{}", self.begun, F::EXTENSION));
+        }
+        self.begun += 1;
+        F::create(&path, table).map_err(|error| cannot_write(self.output, &error))
+    }
+
+    fn end_files(&mut self) -> Result<(), Failure> {
+        let files = mem::take(&mut self.files).into_values();
+        let mut ended = files.map(F::finish);
+        ended.try_for_each(|it| it.map_err(|error| cannot_write(self.output, &error)))
     }
 
     /// Ends every file, and writes the list of their columns.
-    pub(super) fn finish(self) -> Result<(), Failure> {
-        let mut list = format!("{COLUMNS}\n");
-        for (lines, file) in self.files.into_values() {
-            file.finish().map_err(|error| cannot_write(self.output, &error))?;
-            list.push_str(&lines);
-        }
+    pub(super) fn finish(mut self) -> Result<(), Failure> {
+        self.end_files()?;
+        let list = self.lists.into_values().fold(format!("{COLUMNS}\n"), |list, its| list + &its);
         let written = write(&self.path.join(LIST), &list);
         written.map_err(|error| cannot_write(self.output, &error))
     }
+}
+
+/// The folders of a partition, such as `day=2026-11-27/line=rover-1%2FttyS4`, which Spark, DuckDB
+/// and others read as two columns.
+fn folders_of(partition: &Partition) -> String {
+    let day = partition.day.map_or_else(
+        || "__HIVE_DEFAULT_PARTITION__".to_owned(),
+        |day| {
+            let time = UNIX_EPOCH + Duration::from_secs(day * 24 * 60 * 60);
+            humantime::format_rfc3339_seconds(time).to_string().chars().take(10).collect()
+        },
+    );
+    let mut folders = format!("day={day}/line=");
+    for byte in partition.line.bytes() {
+        match byte {
+            b'-' | b'.' | b'_' => folders.push(byte.into()),
+            _ if byte.is_ascii_alphanumeric() => folders.push(byte.into()),
+            _ => folders.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    folders
 }
 
 /// The lines of a table in the list of columns.

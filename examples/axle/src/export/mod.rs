@@ -36,6 +36,9 @@ use crate::{
 ///   .csv      a folder with a table per message, and columns.csv with the units
 ///   .parquet  the same as Parquet
 ///
+/// Of several captures or a folder, a table of .parquet is a folder with files for each day and
+/// line, such as day=2026-11-27/line=ttyS4/0.parquet.
+///
 /// A table has the name of its protocol and message, such as ucp.report; the gaps are in skipped.
 /// Times are those of a pcapng or pcap file. Raw bytes have none: their tables have no columns for
 /// time, interface and direction, and MCAP has the offset instead, a nanosecond per byte.

@@ -30,6 +30,8 @@ pub(super) struct Parquet(SerializedFileWriter<File>);
 impl TableFile for Parquet {
     const EXTENSION: &'static str = "parquet";
 
+    const TAKES_PARTITIONS: bool = true;
+
     type Error = ParquetError;
 
     fn create(path: &Path, table: &Table) -> Result<Self, ParquetError> {

@@ -11,7 +11,7 @@ use crate::{
 
 /// All rows as lines of `decode --json`, by their numbers.
 #[derive(Default)]
-struct Lines(std::collections::BTreeMap<u64, Value>);
+struct Lines(BTreeMap<u64, Value>);
 
 impl Sink for Lines {
     fn rows(&mut self, table: &Table) -> Result<(), Failure> {
@@ -63,12 +63,12 @@ fn line(table: &Table, row: usize) -> Value {
 
 /// The rows of a capture, and the lines of its listing.
 fn both(path: &Path, named: Option<Protocol>) -> (Vec<Value>, Vec<Value>) {
-    let mut input = Input::open(vec![path.to_owned()], Form::default()).unwrap();
+    let mut input = Input::open(vec![path.to_owned()], None, Form::default()).unwrap();
     let chosen = decode::choose(&mut input, named).unwrap();
     let mut rows = Lines::default();
     decode::walk_into(&mut input, &chosen, &mut rows, || Ok(())).unwrap();
 
-    let mut input = Input::open(vec![path.to_owned()], Form::default()).unwrap();
+    let mut input = Input::open(vec![path.to_owned()], None, Form::default()).unwrap();
     let chosen = decode::choose(&mut input, named).unwrap();
     let mut sheet = Sheet::new(Some(Style::Json));
     chosen.walk(&mut input, &mut sheet, |_, _| Ok(())).unwrap();
