@@ -215,7 +215,7 @@ impl Input {
         if front.len() >= SAMPLE_LEN && hex::is_hex(front) {
             return Err(Failure::Usage("the capture is hex text: use --hex".to_owned()));
         }
-        if let [0xFF, 0xFB..=0xFE, ..] = front {
+        if is_telnet(front) {
             eprintln!(
                 "axle: the capture begins as telnet does, which doubles each FF byte: frames with \
                  such a byte are lost; record from a raw TCP port"
@@ -329,6 +329,11 @@ impl Read for &mut Input {
         }
         Ok(count)
     }
+}
+
+/// Whether bytes begin as telnet does: with what a server offers and asks for.
+pub(crate) const fn is_telnet(front: &[u8]) -> bool {
+    matches!(front, [0xFF, 0xFB..=0xFE, ..])
 }
 
 /// A bar on standard error, if that is a terminal and the listing does not go to the terminal too.

@@ -2,14 +2,16 @@
 
 use std::{
     io::{self, ErrorKind, Read as _, Write as _},
-    net::{TcpStream, ToSocketAddrs},
+    mem,
+    net::{SocketAddr, TcpStream, ToSocketAddrs},
     ops::Range,
-    time::Duration,
+    time::{Duration, Instant as Clock},
 };
 
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
 use super::wire::Wire;
+use crate::{clock, input::is_telnet};
 
 /// Longest time for a server to accept a connection.
 const CONNECT_PATIENCE: Duration = Duration::from_secs(3);
@@ -18,22 +20,38 @@ const CONNECT_PATIENCE: Duration = Duration::from_secs(3);
 /// what to send, so that no outdated command leaves late (ruling U16).
 const WRITE_PATIENCE: Duration = Duration::from_millis(20);
 
-/// A connection to `HOST:PORT`.
+/// The same, after a connection was lost: a stop may be waiting.
+const RECONNECT_PATIENCE: Duration = Duration::from_secs(1);
+
+/// Interval between two attempts to connect again.
+const RECONNECT_PERIOD: Duration = Duration::from_millis(50);
+
+/// A connection to `HOST:PORT`. If it is lost, that is an error; what is asked of the port then
+/// connects again, so that a stop gets through as soon as the server is back.
 pub(super) struct TcpPort {
-    stream: TcpStream,
+    address: SocketAddr,
+    connection: Connection,
+    /// Nothing was received on this connection yet.
+    is_new: bool,
     held: [u8; 1024],
     unread: Range<usize>,
+}
+
+enum Connection {
+    Open(TcpStream),
+    /// Why, and when it was last tried to connect.
+    Lost(String, Clock),
 }
 
 impl TcpPort {
     pub(super) fn connect(address: &str) -> io::Result<Self> {
         let mut failure = io::Error::new(ErrorKind::InvalidInput, "the name has no address");
         for address in address.to_socket_addrs()? {
-            match TcpStream::connect_timeout(&address, CONNECT_PATIENCE) {
+            match open(&address, CONNECT_PATIENCE) {
                 Ok(stream) => {
-                    stream.set_nodelay(true)?;
-                    stream.set_write_timeout(Some(WRITE_PATIENCE))?;
-                    return Ok(Self { stream, held: [0; 1024], unread: 0..0 });
+                    let (connection, is_new) = (Connection::Open(stream), true);
+                    let (held, unread) = ([0; 1024], 0..0);
+                    return Ok(Self { address, connection, is_new, held, unread });
                 }
                 Err(error) => failure = error,
             }
@@ -42,24 +60,56 @@ impl TcpPort {
     }
 
     /// Whether the server is on this machine.
-    pub(super) fn is_local(&self) -> bool {
-        self.stream.peer_addr().is_ok_and(|peer| peer.ip().is_loopback())
+    pub(super) const fn is_local(&self) -> bool {
+        self.address.ip().is_loopback()
     }
 
-    /// A signal ends the wait, so that endless signals cannot prolong it.
-    fn receive(&mut self) -> io::Result<bool> {
-        match self.stream.read(&mut self.held) {
-            Ok(0) => Err(lost("the server has closed the connection")),
-            Ok(count) => {
-                self.unread = 0..count;
-                Ok(true)
+    /// Does this with the connection; one that was lost is opened again. `None` if it takes longer
+    /// than it may, or a signal came, so that endless signals cannot prolong it.
+    fn with<T>(
+        &mut self,
+        act: impl FnOnce(&mut TcpStream, &mut [u8]) -> io::Result<T>,
+    ) -> io::Result<Option<T>> {
+        let stream = match &mut self.connection {
+            Connection::Open(stream) => stream,
+            Connection::Lost(cause, tried_at) => {
+                if clock::since(*tried_at) < RECONNECT_PERIOD {
+                    return Err(lost(cause));
+                }
+                let opened = open(&self.address, RECONNECT_PATIENCE);
+                *tried_at = clock::now();
+                self.connection = Connection::Open(opened.map_err(|_| lost(cause))?);
+                self.is_new = true;
+                let Connection::Open(stream) = &mut self.connection else { return Ok(None) };
+                stream
             }
+        };
+        let cause = match act(stream, &mut self.held) {
+            Ok(done) => return Ok(Some(done)),
             Err(error) => match error.kind() {
-                ErrorKind::Interrupted | ErrorKind::TimedOut | ErrorKind::WouldBlock => Ok(false),
-                _ => Err(lost(&error.to_string())),
+                ErrorKind::Interrupted | ErrorKind::TimedOut | ErrorKind::WouldBlock => {
+                    return Ok(None);
+                }
+                ErrorKind::UnexpectedEof => "the server has closed the connection".to_owned(),
+                _ => error.to_string(),
             },
-        }
+        };
+        Err(self.close(cause))
     }
+
+    fn close(&mut self, cause: impl Into<String>) -> io::Error {
+        let cause = cause.into();
+        let failure = lost(&cause);
+        self.connection = Connection::Lost(cause, clock::now());
+        failure
+    }
+}
+
+fn open(address: &SocketAddr, patience: Duration) -> io::Result<TcpStream> {
+    let stream = TcpStream::connect_timeout(address, patience)?;
+    stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(WRITE_PATIENCE))?;
+    Ok(stream)
 }
 
 fn lost(cause: &str) -> io::Error {
@@ -71,14 +121,27 @@ impl Wire for TcpPort {
         if !self.unread.is_empty() {
             return Ok(true);
         }
-        if patience.is_zero() {
-            self.stream.set_nonblocking(true)?;
-            let received = self.receive();
-            self.stream.set_nonblocking(false)?;
-            return received;
+        let received = self.with(|stream, held| {
+            let received = if patience.is_zero() {
+                stream.set_nonblocking(true)?;
+                let received = stream.read(held);
+                stream.set_nonblocking(false)?;
+                received
+            } else {
+                stream.set_read_timeout(Some(patience))?;
+                stream.read(held)
+            };
+            match received? {
+                0 => Err(ErrorKind::UnexpectedEof.into()),
+                count => Ok(count),
+            }
+        })?;
+        let Some(count) = received else { return Ok(false) };
+        if mem::take(&mut self.is_new) && is_telnet(self.held.get(..count).unwrap_or_default()) {
+            return Err(self.close("it speaks telnet, which changes FF bytes: use a raw TCP port"));
         }
-        self.stream.set_read_timeout(Some(patience))?;
-        self.receive()
+        self.unread = 0..count;
+        Ok(true)
     }
 }
 
@@ -107,16 +170,8 @@ impl Read for TcpPort {
 
 impl Write for TcpPort {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self.stream.write(bytes) {
-            Ok(count) => Ok(count),
-            Err(error) => match error.kind() {
-                // A signal came, or the time is over, before a byte was taken.
-                ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-                    Err(ErrorKind::TimedOut.into())
-                }
-                _ => Err(lost(&error.to_string())),
-            },
-        }
+        let taken = self.with(|stream, _| stream.write(bytes))?;
+        taken.ok_or_else(|| ErrorKind::TimedOut.into())
     }
 
     /// Nothing to wait for: only the server knows when the bytes are on the line.
@@ -164,6 +219,39 @@ mod tests {
         let error = port.wait(Duration::from_secs(10)).unwrap_err();
         assert_eq!(error.to_string(), "disconnected (the server has closed the connection)");
         assert!(port.read_ready().is_err() && port.read(&mut buffer).is_err());
+    }
+
+    #[test]
+    fn a_lost_connection_is_opened_again_by_what_is_asked_next() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let mut port = TcpPort::connect(&address).unwrap();
+        drop(listener.accept().unwrap());
+        assert!(port.wait(Duration::from_secs(10)).is_err());
+        // Not at once: a server that closes every connection is not overrun.
+        assert!(port.write(&[1]).is_err());
+        thread::sleep(RECONNECT_PERIOD);
+        assert_eq!(port.write(&[2]).unwrap(), 1);
+        let (mut server, mut buffer) = (listener.accept().unwrap().0, [0; 2]);
+        assert_eq!((server.read(&mut buffer).unwrap(), buffer[0]), (1, 2));
+        server.write_all(&[3]).unwrap();
+        assert_eq!((port.read(&mut buffer).unwrap(), buffer[0]), (1, 3));
+    }
+
+    #[test]
+    fn a_server_that_speaks_telnet_is_refused() {
+        let (mut port, mut server) = pair();
+        // It offers to suppress "go ahead".
+        server.write_all(&[0xFF, 0xFB, 3]).unwrap();
+        let error = port.wait(Duration::from_secs(10)).unwrap_err().to_string();
+        assert!(error.contains("it speaks telnet"), "{error}");
+        let (mut port, mut server) = pair();
+        for bytes in [[0xFD, 0xFF], [0xFF, 0xFB]] {
+            server.write_all(&bytes).unwrap();
+            assert!(port.wait(Duration::from_secs(10)).unwrap(), "in the middle they mean nothing");
+            let mut buffer = [0; 2];
+            assert_eq!((port.read(&mut buffer).unwrap(), buffer), (2, bytes));
+        }
     }
 
     #[test]

@@ -13,10 +13,10 @@ use serialport::{SerialPort, TTYPort};
 use super::{Process, TWO_NODES, sim};
 
 /// A server for one connection at a time to a serial port. It closes the connection when it is told
-/// to.
+/// to, and takes the next one after that time, if ever.
 struct Server {
     address: String,
-    close: Sender<()>,
+    close: Sender<Option<Duration>>,
 }
 
 impl Server {
@@ -27,14 +27,16 @@ impl Server {
         let address = format!("tcp:{}", listener.local_addr().unwrap());
         let (close, closed) = mpsc::channel();
         thread::spawn(move || {
-            for stream in listener.incoming() {
-                let mut stream: TcpStream = stream.unwrap();
+            'next: loop {
+                let mut stream: TcpStream = listener.accept().unwrap().0;
                 stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
                 let mut buffer = [0; 256];
                 loop {
-                    if closed.try_recv().is_ok() {
+                    if let Ok(pause) = closed.try_recv() {
                         stream.shutdown(Shutdown::Both).unwrap();
-                        break;
+                        let Some(pause) = pause else { return };
+                        thread::sleep(pause);
+                        continue 'next;
                     }
                     match stream.read(&mut buffer) {
                         Ok(0) => break,
@@ -71,10 +73,31 @@ fn a_tcp_server_that_goes_away_is_told_with_what_may_be_moving() {
     let server = Server::start(&port);
     let spin = Process::start(&format!("spin -p {} --node 1 --rps 2 --for 600", server.address));
     sim.line("node 1: command 2.00 rps");
-    server.close.send(()).unwrap();
+    server.close.send(None).unwrap();
     let error = spin.complaint(1);
     let lost = format!("port {:?} failed: disconnected (", server.address);
     assert!(error.starts_with(&lost) && error.ends_with("it may be moving"), "{error}");
+}
+
+#[test]
+fn a_tcp_server_that_closes_the_connection_and_takes_another_is_told_and_what_moves_is_stopped() {
+    for (device, command, moves, rests) in [
+        (TWO_NODES, "spin --node 1 --rps 2", "node 1: command 2.00 rps", "node 1: at rest"),
+        ("ucp", "drive --speed 50", "command: speed 50 %, turn 0 %", "at rest after"),
+    ] {
+        for pause in [0, 500] {
+            let (sim, port) = sim(device);
+            let server = Server::start(&port);
+            let process = Process::start(&format!("{command} --for 600 -p {}", server.address));
+            sim.line(moves);
+            server.close.send(Some(Duration::from_millis(pause))).unwrap();
+            let error = process.complaint(1);
+            let lost = format!("port {:?} failed: disconnected (", server.address);
+            assert!(error.starts_with(&lost), "{error}");
+            assert!(error.ends_with("; it was stopped and is at rest"), "{error}");
+            sim.line(rests);
+        }
+    }
 }
 
 #[test]
