@@ -23,6 +23,7 @@ import tempfile
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
+import containers
 from story import IN, OUT, STORY, UNKNOWN, make
 
 HERE = Path(__file__).resolve().parent
@@ -33,6 +34,8 @@ WAYS = {"in": IN, "out": OUT, None: UNKNOWN}
 # Fewer values mean that hardly anything was compared.
 LEAST_VALUES = 100_000
 LIVE_PACKETS = 100
+# Random files.
+CONTAINERS = 120
 WARNINGS = {"bad_crc", "gap", "unanswered", "late", "foreign", "mode_changed", "not_a_number",
             "hazard", "battery"}
 # Fields of exchanges, which no line of JSON has; and keys of JSON that Wireshark itself shows.
@@ -42,12 +45,8 @@ XYZ = ("x", "y", "z")
 WHEELS = ("front_left", "front_right", "back_left", "back_right")
 
 
-def padded(data):
-    return data + bytes(-len(data) % 4)
-
-
 def option(code, value):
-    return struct.pack("<HH", code, len(value)) + padded(value)
+    return struct.pack("<HH", code, len(value)) + containers.padded(value)
 
 
 def block(kind, body):
@@ -66,7 +65,7 @@ def pcapng(interfaces, packets, now=1_700_000_000_123_456):
         now += step
         head = struct.pack("<5I", interface, now >> 32, now & 0xFFFFFFFF, len(data), len(data))
         flags = option(2, struct.pack("<I", way)) + bytes(4) if way else b""
-        file += block(6, head + padded(data) + flags)
+        file += block(6, head + containers.padded(data) + flags)
     return file
 
 
@@ -167,8 +166,9 @@ def shown_by_tshark(user, path):
             if proto.get("name") not in ("geninfo", "frame", "fake-field-wrapper")]
 
 
-def decoded(path):
-    out = subprocess.run([AXLE, "decode", "--json", path], stdout=subprocess.PIPE, check=True)
+def decoded(path, *options):
+    out = subprocess.run([AXLE, "decode", "--json", *options, path], stdout=subprocess.PIPE,
+                         check=True)
     rows = map(json.loads, out.stdout.splitlines())
     return [row for row in rows if row["event"] in ("frame", "skipped")]
 
@@ -320,6 +320,33 @@ class Comparison:
                 numbers = [[it for it in field if it in listed] for field in numbers]
                 self.expect(f"{path.stem}: -R {wanted}: {time}", (info, fields), (text, numbers))
 
+    def containers(self, user, folder):
+        """Random files have the packets, times, interfaces and directions that tshark finds."""
+        for seed in range(CONTAINERS):
+            contents, count, before = containers.capture(random.Random(seed))
+            path = folder / "random.pcapng"
+            path.write_bytes(contents)
+            found = [(row.get("t") and round(row["t"] * 1e6), row["interface"],
+                      row.get("direction"), row.get("bytes"))
+                     for row in decoded(path, "--protocol", "ucp")]
+            wanted = []
+            for packet in json.loads(user.run("tshark", "-r", path, "-T", "json", "-x")):
+                frame = packet["_source"]["layers"]["frame"]
+                if "frame.interface_id" not in frame:
+                    # A custom block, which tshark lists too.
+                    continue
+                seconds, _, fraction = frame.get("frame.time_epoch", "").partition(".")
+                flags = frame.get("frame.packet_flags_tree", {}).get("frame.packet_flags_direction")
+                wanted.append((int(seconds + fraction[:6]) if seconds else None,
+                               before[int(frame["frame.section_number"]) - 1]
+                               + int(frame["frame.interface_id"]),
+                               {IN: "in", OUT: "out"}.get(int(flags or "0", 0)),
+                               packet["_source"]["layers"]["frame_raw"][0]))
+            self.expect(f"random file {seed}: packets", len(wanted), count)
+            for number, (one, other) in enumerate(zip(found, wanted), 1):
+                self.expect(f"random file {seed}: packet {number}", one, other)
+            self.expect(f"random file {seed}: frames", len(found), count)
+
     def hanging(self, user):
         """Captures that cannot begin end by themselves."""
         for port, protocol, *more in (("/dev/no-such-port", "ucp"), ("/dev/null", "modbus"),
@@ -377,6 +404,7 @@ def main():
         found.filters(user, paths)
         found.settings(user, paths[0], Path(folder) / "vectors.pcapng")
         found.hanging(user)
+        found.containers(user, Path(folder))
     print(f"{found.values} values of {found.rows} frames and gaps in {len(paths)} captures: "
           f"{len(found.differences)} differences")
     print(*found.differences[:20], sep="\n", end="\n" if found.differences else "")
