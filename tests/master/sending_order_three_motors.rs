@@ -20,8 +20,9 @@ fn longest_wait(
 ) -> usize {
     let mut longest = 0;
     let starts = (0..5).flat_map(|offset| [1, 2, 3, 4, 5, 7, 1000].map(|period| (offset, period)));
-    for (offset, period) in starts {
-        let mut boards = Boards::new(direct(), modes, 900);
+    let starts = starts.flat_map(|start| [(start, direct()), (start, manual())]);
+    for ((offset, period), config) in starts {
+        let mut boards = Boards::new(config, modes, 900);
         let mut waited = None;
         for turn in 0..1000 {
             for &node in &NodeId::ALL[..7] {
@@ -64,6 +65,33 @@ fn a_velocity_stop_waits_for_at_most_seven_other_stops_and_the_hold_under_way() 
         let begin = |boards: &mut Boards| boards.master.stop(NodeId::N8, boards.now);
         let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (WRITE, 8));
         assert!(waited <= 8, "{waited} of {modes:?}");
+    }
+}
+
+#[test]
+fn a_node_that_was_stopped_and_turned_again_is_stopped_before_others_are_turned() {
+    // By hand, a round may last forever.
+    let mut boards = Boards::new(manual(), [Mode::Velocity; 8], 900);
+    for node in NodeId::ALL {
+        set(&mut boards, node, 1);
+        boards.exchange();
+    }
+    let next = |boards: &mut Boards| {
+        let packet = boards.exchange().expect("something to do");
+        (packet[0], packet[1])
+    };
+    for speed in 2..5 {
+        boards.master.stop(NodeId::N8, boards.now);
+        assert_eq!(next(&mut boards), (WRITE, 8), "{speed}");
+        while boards.master.stop_progress(NodeId::N8) == StopProgress::Owed {
+            next(&mut boards);
+        }
+        // Its new set-point leaves, the others wait for theirs.
+        set(&mut boards, NodeId::N8, speed);
+        assert_eq!(next(&mut boards), (WRITE, 8));
+        for &node in &NodeId::ALL[..7] {
+            set(&mut boards, node, speed);
+        }
     }
 }
 

@@ -494,9 +494,11 @@ impl<B: Board> Stop<B> {
         self.lost_attempts
     }
 
-    /// Whether it is written again, whatever else is due: not before its first WRITE.
+    /// Whether it is written again, whatever else is due: not before its first WRITE, and a
+    /// position not before the first answer behind it. That READ would come later, and the position
+    /// be measured anew in the meantime.
     pub(super) fn is_repeated(&self) -> bool {
-        self.stage == Stage::Confirmed || self.written_at.is_some()
+        self.followed > 0 || self.written_at.is_some() && !self.is_there
     }
 
     /// When it is; `None` for at once.

@@ -250,7 +250,7 @@ impl Queue {
 
     /// Advances the turns past a request that has been handed out. `exchange` is the time of one
     /// with a node that does not answer.
-    pub(super) fn book(
+    pub(super) fn book<B: Board>(
         &mut self,
         turn: Turn,
         is_exchange: bool,
@@ -273,6 +273,10 @@ impl Queue {
             Reason::SetPoint => {
                 self.set_point = index;
                 self.had_set_point |= 1 << index;
+                if B::ANSWERS_WRITE {
+                    // A stop of this node is due in this round, even if it has had one before.
+                    self.had_stop &= !(1 << index);
+                }
             }
             // The node has yet to be read.
             _ if !is_exchange => {}

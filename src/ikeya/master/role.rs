@@ -338,7 +338,7 @@ impl<B: Board> Master<B> {
         }
         self.line.send(turn, request, &self.config, &mut self.statistics, now)?;
         let exchange = self.line.window_time(&self.config) + self.config.turnaround_gap;
-        self.queue.book(turn, request.is_exchange(), exchange, &self.config, now);
+        self.queue.book::<B>(turn, request.is_exchange(), exchange, &self.config, now);
         if matches!(request, Request::Write(_)) {
             node.wrote(now);
         }
