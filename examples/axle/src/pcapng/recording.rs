@@ -18,7 +18,7 @@ use crate::{args::Protocol, clock, failure::Failure};
 /// A capture in a file or on standard output, and the clock of its times.
 pub(crate) struct Recording {
     /// What is not written yet.
-    writer: Writer<Vec<u8>>,
+    writer: Writer,
     output: Output,
     keeper: Option<Keeper>,
     path: PathBuf,
@@ -161,7 +161,7 @@ impl Recording {
             Output::Pipe(_) | Output::Stdout(_) => None,
         };
         let mut recording = Self {
-            writer: Writer::new(Vec::new(), protocol, port, baud)?,
+            writer: Writer::new(protocol, port, baud),
             output,
             keeper,
             path: path.to_owned(),
@@ -199,8 +199,7 @@ impl Recording {
     /// What follows is of another line.
     pub(crate) fn change_line(&mut self, protocol: Protocol, port: &str, baud: u32) {
         self.line = (protocol, port.to_owned(), baud);
-        let added = self.writer.interface(protocol, port, baud);
-        added.unwrap_or_else(|error| self.fail(error));
+        self.writer.interface(protocol, port, baud);
     }
 
     /// The time, microseconds since 1970. It never goes backwards.
@@ -211,15 +210,14 @@ impl Recording {
     /// Adds a packet of this time, which the next [`flush`](Self::flush) writes.
     pub(crate) fn packet(&mut self, micros: u64, direction: Option<Direction>, bytes: &[u8]) {
         if self.files.as_ref().is_some_and(|files| {
-            let len = self.len + self.writer.get_mut().len() as u64 + packet_len(bytes);
+            let len = self.len + self.writer.blocks.len() as u64 + packet_len(bytes);
             files.is_over(len, micros)
         }) {
             self.flush();
             self.change_file(micros);
         }
         if self.failure.is_none() {
-            let added = self.writer.packet(micros, direction, bytes);
-            added.unwrap_or_else(|error| self.fail(error));
+            self.writer.packet(micros, direction, bytes);
         }
     }
 
@@ -232,7 +230,7 @@ impl Recording {
 
     /// Of blocks that do not fit, the whole ones stay: a part would make the file invalid.
     fn write(&mut self) -> io::Result<()> {
-        let mut blocks = mem::take(self.writer.get_mut());
+        let mut blocks = mem::take(&mut self.writer.blocks);
         let (count, written) = write_most(&mut self.output, &blocks);
         let (len, packets) = whole_blocks(blocks.get(..count).unwrap_or_default());
         self.len += len as u64;
@@ -245,7 +243,7 @@ impl Recording {
             let _ = file.set_len(self.len);
         }
         blocks.clear();
-        *self.writer.get_mut() = blocks;
+        self.writer.blocks = blocks;
         written
     }
 

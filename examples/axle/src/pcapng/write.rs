@@ -1,41 +1,34 @@
 //! Writes a capture.
 
-use std::io::{self, Write};
-
 use super::format::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
 use crate::args::Protocol;
 
-/// Writes blocks, each with a single call.
+/// Writes blocks into memory.
 #[derive(Debug)]
-pub(crate) struct Writer<W> {
-    out: W,
-    block: Vec<u8>,
+pub(crate) struct Writer {
+    /// Those that the caller has not taken yet.
+    pub(crate) blocks: Vec<u8>,
     /// Number of interfaces so far; packets are of the last one.
     interfaces: u32,
 }
 
-impl<W: Write> Writer<W> {
+impl Writer {
     /// Starts a capture with one interface, this line.
-    pub(crate) fn new(out: W, protocol: Protocol, port: &str, baud: u32) -> io::Result<Self> {
-        let mut writer = Self { out, block: Vec::new(), interfaces: 0 };
+    pub(crate) fn new(protocol: Protocol, port: &str, baud: u32) -> Self {
+        let mut writer = Self { blocks: Vec::new(), interfaces: 0 };
         writer.write(u32::from_le_bytes(MAGIC), |body| {
             body.extend(BYTE_ORDER.to_le_bytes());
             body.extend([1, 0, 0, 0]); // version 1.0
             body.extend((-1_i64).to_le_bytes()); // length of the section: unknown
             put_option(body, option::USER_APPLICATION, b"axle");
             put_option(body, option::END, &[]);
-        })?;
-        writer.interface(protocol, port, baud)?;
-        Ok(writer)
+        });
+        writer.interface(protocol, port, baud);
+        writer
     }
 
     /// Continues with another line, as a new interface.
-    pub(crate) fn interface(
-        &mut self,
-        protocol: Protocol,
-        port: &str,
-        baud: u32,
-    ) -> io::Result<()> {
+    pub(crate) fn interface(&mut self, protocol: Protocol, port: &str, baud: u32) {
         self.write(block::INTERFACE, |body| {
             body.extend(link_type(protocol).to_le_bytes());
             body.extend([0; 2]);
@@ -45,18 +38,12 @@ impl<W: Write> Writer<W> {
             put_option(body, option::SPEED, &u64::from(baud).to_le_bytes());
             put_option(body, option::TIME_UNIT, &[6]); // 10^-6 s
             put_option(body, option::END, &[]);
-        })?;
+        });
         self.interfaces += 1;
-        Ok(())
     }
 
     /// Appends bytes that were complete at this time, microseconds since 1970.
-    pub(crate) fn packet(
-        &mut self,
-        micros: u64,
-        direction: Option<Direction>,
-        bytes: &[u8],
-    ) -> io::Result<()> {
+    pub(crate) fn packet(&mut self, micros: u64, direction: Option<Direction>, bytes: &[u8]) {
         let interface = self.interfaces.saturating_sub(1);
         self.write(block::PACKET, |body| {
             body.extend(interface.to_le_bytes());
@@ -70,30 +57,19 @@ impl<W: Write> Writer<W> {
                 put_option(body, option::FLAGS, &direction.flags().to_le_bytes());
                 put_option(body, option::END, &[]);
             }
-        })
+        });
     }
 
-    /// The output, for example to flush it.
-    pub(crate) const fn get_mut(&mut self) -> &mut W {
-        &mut self.out
-    }
-
-    #[cfg(test)]
-    pub(super) fn out_for_test(self) -> W {
-        self.out
-    }
-
-    fn write(&mut self, kind: u32, body: impl FnOnce(&mut Vec<u8>)) -> io::Result<()> {
-        self.block.clear();
-        self.block.extend(kind.to_le_bytes());
-        self.block.extend([0; 4]);
-        body(&mut self.block);
-        let len = (self.block.len() as u32 + 4).to_le_bytes();
-        self.block.extend(len);
-        if let Some(place) = self.block.get_mut(4..8) {
+    fn write(&mut self, kind: u32, body: impl FnOnce(&mut Vec<u8>)) {
+        let begin = self.blocks.len();
+        self.blocks.extend(kind.to_le_bytes());
+        self.blocks.extend([0; 4]);
+        body(&mut self.blocks);
+        let len = ((self.blocks.len() - begin) as u32 + 4).to_le_bytes();
+        self.blocks.extend(len);
+        if let Some(place) = self.blocks.get_mut(begin + 4..begin + 8) {
             place.copy_from_slice(&len);
         }
-        self.out.write_all(&self.block)
     }
 }
 

@@ -31,12 +31,11 @@ fn file(name: &str, bytes: &[u8]) -> Capture {
 
 /// A capture of a bus: times in milliseconds.
 fn capture(name: &str, packets: &[(u64, Option<Direction>, &[u8])]) -> Capture {
-    let mut bytes = Vec::new();
-    let mut writer = Writer::new(&mut bytes, Protocol::Ikeya, "port", 500_000).unwrap();
+    let mut writer = Writer::new(Protocol::Ikeya, "port", 500_000);
     for (millis, direction, packet) in packets {
-        writer.packet(1_000_000_000 + millis * 1000, *direction, packet).unwrap();
+        writer.packet(1_000_000_000 + millis * 1000, *direction, packet);
     }
-    file(name, &bytes)
+    file(name, &writer.blocks)
 }
 
 fn parsed(capture: &Capture, words: &str) -> Args {
