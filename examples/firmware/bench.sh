@@ -27,7 +27,7 @@ figures=$(
     over_empty flash_ikeya8_slice release/size_ikeya8 "$flash" 230
     over_empty flash_ucp44_slice release/size_ucp44 "$flash" 370
     over_empty flash_both_slices release/size_both "$flash" 600
-    # 16 % more than before stops were repeated until a motor is still: 8316 bytes.
+    # 10 % more than before stops were repeated until a motor is still: 8316 bytes.
     over_empty flash_master release/size_master "$flash" 9148
     for role in slave host robot; do over_empty "flash_$role" "release/size_$role" "$flash" -; done
     # All constants together, so that no table goes unnoticed.
