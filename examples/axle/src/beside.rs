@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn what_another_process_of_the_same_number_has_left_is_no_obstacle() {
         let path = std::env::temp_dir().join(format!("axle-{}-beside.jsonl", process::id()));
-        let input = Input::open(Vec::new(), None, Form::default()).unwrap();
+        let input = Input::open_one(None, Form::default()).unwrap();
         let left = beside(&path, "part", 0).unwrap();
         fs::write(&left, "left").unwrap();
         let (second, file) = Beside::file(&path, false, &input).unwrap();
@@ -314,7 +314,7 @@ mod tests {
         for attempt in 0..ATTEMPTS {
             fs::create_dir(beside(&path, "part", attempt).unwrap()).unwrap();
         }
-        let input = Input::open(Vec::new(), None, Form::default()).unwrap();
+        let input = Input::open_one(None, Form::default()).unwrap();
         let failure = Beside::folder(&path, false, "csv", &input).unwrap_err();
         assert!(failure.to_string().contains("remove the hidden .part files"), "{failure}");
         fs::remove_dir_all(folder).unwrap();

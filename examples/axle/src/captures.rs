@@ -1,13 +1,14 @@
 //! Captures named by files and folders, in the order of time.
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
 };
 
 use crate::{
     failure::Failure,
-    input::{Form, Input},
+    input::{self, Form, Input},
     pcapng::Reader,
 };
 
@@ -16,45 +17,59 @@ const EXTENSIONS: [&str; 4] = [".pcapng", ".pcap", ".pcapng.gz", ".pcap.gz"];
 
 /// Opens files and folders of captures, or standard input for none and `-`.
 pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
-    let is_collection = paths.len() > 1 || paths.iter().any(|path| path.is_dir());
-    let files = in_order(paths, form)?;
-    let root = is_collection.then(|| folder_of_all(&files));
-    Input::open(files, root, form)
+    let [path] = paths else { return open_all(paths, form) };
+    if path.is_dir() { open_all(paths, form) } else { Input::open_one(Some(path), form) }
+}
+
+/// Opens a collection: in the order of the times of the first packets, then of their names. All
+/// must be captures with times; of what is damaged from its first bytes on, the failures are kept.
+fn open_all(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
+    if paths.is_empty() {
+        return Input::open_one(None, form);
+    }
+    let (mut timed, mut left_out, mut seen) = (Vec::new(), Vec::new(), BTreeSet::new());
+    for path in paths {
+        let is_folder = path.is_dir();
+        let files = if is_folder { below(path)? } else { vec![path.clone()] };
+        for file in files {
+            // However it is spelt.
+            if !seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
+                continue;
+            }
+            match first_time(&file, form) {
+                Ok(micros) => timed.push((micros, file)),
+                Err(failure @ Failure::Open { .. }) if !is_folder => return Err(failure),
+                Err(Failure::Usage(line)) if !is_folder => {
+                    let line = format!("{line}: without times, give one file at a time");
+                    return Err(Failure::Usage(line));
+                }
+                Err(failure) => left_out.push(failure),
+            }
+        }
+    }
+    if timed.is_empty() && !left_out.is_empty() {
+        return Err(left_out.swap_remove(0));
+    }
+    timed.sort();
+    let files: Vec<_> = timed.into_iter().map(|(_, file)| file).collect();
+    let root = folder_of_all(&files);
+    Input::collection(files, root, left_out, form)
 }
 
 /// The folder that all files are in or below.
 fn folder_of_all(files: &[PathBuf]) -> PathBuf {
-    let mut parents = files.iter().filter_map(|file| file.parent());
-    let mut root = parents.next().unwrap_or_else(|| Path::new("")).to_owned();
-    for parent in parents {
-        while !parent.starts_with(&root) && root.pop() {}
+    let mut folders = files.iter().map(|file| input::folder_of(file));
+    let mut root = folders.next().unwrap_or_default();
+    for folder in folders {
+        while !folder.starts_with(&root) && root.pop() {}
     }
     root
 }
 
-/// The files, in the order of the times of their first packets, and then of their names. Several
-/// must all be captures with times.
-fn in_order(paths: &[PathBuf], form: Form) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
-    for path in paths {
-        if path.is_dir() { below(path, &mut files)? } else { files.push(path.clone()) }
-    }
-    if files.len() < 2 {
-        return Ok(files);
-    }
-    let mut timed = Vec::new();
-    for path in files {
-        timed.push((first_time(&path, form)?.unwrap_or(u64::MAX), path));
-    }
-    timed.sort();
-    timed.dedup();
-    Ok(timed.into_iter().map(|(_, path)| path).collect())
-}
-
 /// The captures in a folder and those below it; links are not followed.
-fn below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
+fn below(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let cannot_open = |error| Failure::Open { path: folder.to_owned(), error };
-    let (mut folders, begin) = (vec![folder.to_owned()], files.len());
+    let (mut folders, mut files) = (vec![folder.to_owned()], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).map_err(cannot_open)? {
             let entry = entry.map_err(cannot_open)?;
@@ -67,23 +82,25 @@ fn below(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
             }
         }
     }
-    if files.len() == begin {
+    if files.is_empty() {
         let line = format!("{folder:?} has no files that end in .pcapng or .pcap, or that and .gz");
         return Err(Failure::Failed(line));
     }
-    Ok(())
+    Ok(files)
 }
 
-/// The time of the first packet, if there is one.
-fn first_time(path: &Path, form: Form) -> Result<Option<u64>, Failure> {
+/// The time of the first packet; without one, the end of all times.
+fn first_time(path: &Path, form: Form) -> Result<u64, Failure> {
     let mut input = Input::open_one(Some(path), form)?;
+    if input.peek(1, |_| false)?.is_empty() {
+        return Err(Failure::Failed(format!("{path:?} is empty")));
+    }
     if !input.has_times()? {
-        let line = format!("{path:?} is no pcapng or pcap: without times, give one file at a time");
-        return Err(Failure::Usage(line));
+        return Err(Failure::Usage(format!("{path:?} is no pcapng or pcap")));
     }
     // Damage is told when the file is read.
     let mut reader = Reader::new(&mut input);
-    Ok(reader.next().ok().flatten().and_then(|packet| packet.micros))
+    Ok(reader.next().ok().flatten().and_then(|packet| packet.micros).unwrap_or(u64::MAX))
 }
 
 /// The names for a message.

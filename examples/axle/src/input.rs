@@ -58,14 +58,17 @@ pub(crate) struct Input {
     all: Vec<PathBuf>,
     /// The folder that holds all of a collection; `None` for a single capture.
     root: Option<PathBuf>,
+    /// Why captures of a collection were left out.
+    left_out: Vec<Failure>,
 }
 
 impl Input {
-    /// Opens these files, one at a time; or standard input for none and `-`. `root` is the folder
-    /// that holds all of a collection.
-    pub(crate) fn open(
+    /// Opens these files, one at a time. `root` is the folder that holds all of them, and
+    /// `left_out` tells why others were left out.
+    pub(crate) fn collection(
         all: Vec<PathBuf>,
-        root: Option<PathBuf>,
+        root: PathBuf,
+        left_out: Vec<Failure>,
         form: Form,
     ) -> Result<Self, Failure> {
         let mut rest = VecDeque::from(all.clone());
@@ -74,7 +77,7 @@ impl Input {
         if !rest.is_empty() {
             (input.file, input.progress) = (None, None);
         }
-        Ok(Self { rest, all, root, ..input })
+        Ok(Self { rest, all, root: Some(root), left_out, ..input })
     }
 
     /// Whether there are several files, or a folder of them.
@@ -83,11 +86,15 @@ impl Input {
     }
 
     /// The folders between that of the collection and the file.
-    pub(crate) fn folder(&self) -> &Path {
-        let parent = self.path.as_deref().and_then(Path::parent);
-        let below =
-            parent.zip(self.root.as_deref()).and_then(|(it, root)| it.strip_prefix(root).ok());
-        below.unwrap_or_else(|| Path::new(""))
+    pub(crate) fn folder(&self) -> PathBuf {
+        let folder = self.path.as_deref().map(folder_of).unwrap_or_default();
+        let below = self.root.as_deref().and_then(|root| folder.strip_prefix(root).ok());
+        below.unwrap_or_else(|| Path::new("")).to_owned()
+    }
+
+    /// Why captures were left out.
+    pub(crate) fn take_left_out(&mut self) -> Vec<Failure> {
+        mem::take(&mut self.left_out)
     }
 
     /// Goes on with the next file; `false` if this was the last.
@@ -141,6 +148,7 @@ impl Input {
             rest,
             all,
             root: None,
+            left_out: Vec::new(),
         }
     }
 
@@ -329,6 +337,13 @@ impl Read for &mut Input {
         }
         Ok(count)
     }
+}
+
+/// The folder that a file is in, by the name that the system has for it.
+pub(crate) fn folder_of(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|it| !it.as_os_str().is_empty());
+    let folder = folder.unwrap_or_else(|| Path::new("."));
+    folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
 /// Whether bytes begin as telnet does: with what a server offers and asks for.

@@ -50,8 +50,8 @@ pub(crate) trait Sink {
 /// Which rows a table has, if not all.
 #[derive(Clone, Debug, Default, Eq, Ord, PartialEq, PartialOrd)]
 pub(crate) struct Partition {
-    /// Day since 1970, UTC; `None` for rows without a time.
-    pub(crate) day: Option<u64>,
+    /// Day since 1970, UTC. A row without a time is in that of the row before it on its line.
+    pub(crate) day: u64,
     /// Name of the line.
     pub(crate) line: Rc<str>,
 }
@@ -82,8 +82,9 @@ pub(crate) struct Tables {
     /// The partition of the last row, if there are such, and the tables of the others.
     partition: Option<Partition>,
     others: BTreeMap<Partition, Vec<Table>>,
-    /// The line of the next row.
+    /// The line of the next row, and the latest day of each.
     line: Rc<str>,
+    days: BTreeMap<Rc<str>, u64>,
     /// The first of each protocol.
     first: [usize; 3],
     /// The table of the last frame: the next is often of the same message.
@@ -110,9 +111,20 @@ impl Tables {
         let partition = in_partitions.then(Partition::default);
         let all = empty(has_times, partition.as_ref());
         let first = [0, 1, 2].map(|protocol| all.partition_point(|it| place(it) < protocol));
-        let (others, line) = (BTreeMap::new(), "".into());
-        let (last, count, held, is_full, unfit) = (0, 0, 0, false, None);
-        Self { all, partition, others, line, first, last, has_times, count, held, is_full, unfit }
+        Self {
+            all,
+            partition,
+            others: BTreeMap::new(),
+            line: Rc::default(),
+            days: BTreeMap::new(),
+            first,
+            last: 0,
+            has_times,
+            count: 0,
+            held: 0,
+            is_full: false,
+            unfit: None,
+        }
     }
 
     /// What follows is of the line with this name.
@@ -125,11 +137,15 @@ impl Tables {
     /// Lays out the tables of the partition in which a row with this time is.
     fn turn_to_day(&mut self, micros: Option<u64>) {
         let Some(last) = &mut self.partition else { return };
-        let day = micros.map(|micros| micros / DAY_US);
+        let day = match micros {
+            Some(micros) => micros / DAY_US,
+            None => self.days.get(&self.line).copied().unwrap_or_default(),
+        };
         if last.day == day && last.line == self.line {
             return;
         }
         let next = Partition { day, line: Rc::clone(&self.line) };
+        self.days.insert(Rc::clone(&self.line), day);
         let known = self.others.remove(&next);
         let tables = known.unwrap_or_else(|| empty(self.has_times, Some(&next)));
         self.others.insert(mem::replace(last, next), mem::replace(&mut self.all, tables));

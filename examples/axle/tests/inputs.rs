@@ -152,16 +152,16 @@ fn each_packet_of_a_capture_from_a_pipe_is_listed_before_the_next_one_arrives() 
 fn set(name: &str) -> (PathBuf, String) {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(folder.join("sub")).unwrap();
+    fs::create_dir_all(&folder).unwrap();
     let ping = Ping {}.frame(0);
     let capture = |begin: u64| {
         let packet = |at: u64| (begin + 20_000 * at, 1, ping.as_bytes());
         PcapNg::new(150, &[packet(0), packet(1), packet(2)]).0
     };
-    // Neither their names nor their places tell the order.
+    // Their names do not tell the order.
     fs::write(folder.join("c.pcapng"), capture(1_000_000)).unwrap();
     fs::write(folder.join("a.pcapng.gz"), packed(&capture(2_000_000))).unwrap();
-    fs::write(folder.join("sub/b.pcapng"), capture(3_000_000)).unwrap();
+    fs::write(folder.join("b.pcapng"), capture(3_000_000)).unwrap();
     let path = folder.to_str().unwrap().to_owned();
     (folder, path)
 }
@@ -174,7 +174,7 @@ fn several_files_and_a_folder_are_one_capture_in_the_order_of_time() {
         assert!(output.status.success(), "{args:?}: {output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    let files = ["sub/b.pcapng", "a.pcapng.gz", "c.pcapng"].map(|it| format!("{path}/{it}"));
+    let files = ["b.pcapng", "a.pcapng.gz", "c.pcapng"].map(|it| format!("{path}/{it}"));
     let [b, a, c] = files.each_ref().map(String::as_str);
     let times = |lines: &str| -> Vec<_> {
         let lines = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
@@ -192,6 +192,43 @@ fn several_files_and_a_folder_are_one_capture_in_the_order_of_time() {
     let output = folder.join("set.jsonl");
     run(&["export", &path, "-o", output.to_str().unwrap()]);
     assert_eq!(times(&fs::read_to_string(output).unwrap()), absolute);
+}
+
+#[test]
+fn captures_in_different_folders_are_of_different_lines() {
+    let (folder, path) = set("folders");
+    fs::create_dir(folder.join("other")).unwrap();
+    fs::rename(folder.join("b.pcapng"), folder.join("other/b.pcapng")).unwrap();
+    let output = axle(&["replay", "--dry-run", &path]).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("has more than one line"), "{error}");
+    let output = axle(&["decode", "--json", &path]).output().unwrap();
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let interfaces: Vec<_> = lines
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).unwrap()["interface"].as_u64())
+        .collect();
+    assert_eq!(interfaces, [0, 0, 0, 0, 0, 0, 1, 1, 1]);
+}
+
+#[test]
+fn a_file_is_read_once_however_it_is_named() {
+    let (folder, path) = set("names-twice");
+    let again = format!("{path}/../names-twice/b.pcapng");
+    let c = folder.join("c.pcapng");
+    let output = axle(&["decode", &path, &again, c.to_str().unwrap()]).output().unwrap();
+    let listing = String::from_utf8(output.stdout).unwrap();
+    assert!(listing.contains(" in 9 frames"), "{listing}");
+}
+
+#[test]
+fn sections_of_one_line_in_a_file_of_several_are_one_line() {
+    let (folder, path) = set("sections");
+    let [b, c] = ["b.pcapng", "c.pcapng"].map(|name| fs::read(folder.join(name)).unwrap());
+    fs::write(folder.join("c.pcapng"), [c, b].concat()).unwrap();
+    fs::remove_file(folder.join("b.pcapng")).unwrap();
+    let output = axle(&["replay", "--dry-run", &path]).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
 }
 
 #[test]
@@ -220,6 +257,22 @@ fn a_bad_file_among_several_is_named_and_costs_nothing_of_the_others() {
     assert_eq!(output.status.code(), Some(1));
     assert!(error.contains("c.pcapng"), "{error}");
     assert_eq!(out.lines().filter(|line| line.contains("\"ping\"")).count(), 9, "{out}");
+    // Each is told: others that are empty, packed and cut in their first bytes, or no captures.
+    fs::write(folder.join("empty.pcapng"), []).unwrap();
+    fs::write(folder.join("cut.pcapng.gz"), &packed(&cut)[..5]).unwrap();
+    fs::write(folder.join("odd.pcap"), "years of work").unwrap();
+    let output = axle(&["decode", "--json", &path]).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap());
+    assert_eq!(output.status.code(), Some(1));
+    let names =
+        ["c.pcapng", "empty.pcapng\" is empty", "cut.pcapng.gz", "odd.pcap\" is no pcapng or pcap"];
+    for name in names {
+        assert_eq!(error.matches(name).count(), 1, "{name}: {error}");
+    }
+    assert_eq!(out.lines().filter(|line| line.contains("\"ping\"")).count(), 9, "{out}");
+    for name in ["empty.pcapng", "cut.pcapng.gz", "odd.pcap"] {
+        fs::remove_file(folder.join(name)).unwrap();
+    }
     // Raw bytes have no times, and a folder without captures has nothing.
     fs::write(folder.join("raw.bin"), [0; 8]).unwrap();
     let raw = folder.join("raw.bin");

@@ -46,6 +46,8 @@ pub(crate) struct Walked {
     bad_times: (u64, u64),
     /// Why the capture could not be read to its end. What is before that is on the sheet.
     pub(crate) cut: Option<Failure>,
+    /// There are several captures.
+    is_collection: bool,
     /// Why the walk was given up. What was read is on the sheet.
     pub(crate) broken: Option<Failure>,
 }
@@ -79,9 +81,22 @@ impl Walked {
         }
     }
 
+    /// A capture could not be read to its end. The first is told at the end.
+    fn miss(&mut self, failure: Failure) {
+        if self.cut.is_some() {
+            let _ = failure.report();
+        } else {
+            self.cut = Some(failure);
+        }
+    }
+
     /// What is missing of the capture, for whoever has done something with the rest.
     pub(crate) fn missing(self) -> Result<(), Failure> {
-        self.cut.map_or(Ok(()), |cut| Err(cut.and("what is before that was taken")))
+        let rest = match self.is_collection {
+            true => "all else was taken",
+            false => "what is before that was taken",
+        };
+        self.cut.map_or(Ok(()), |cut| Err(cut.and(rest)))
     }
 }
 
@@ -94,7 +109,9 @@ pub(crate) fn walk(
     sheet: &mut Sheet,
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
-    let (lines, walked) = (BTreeMap::new(), Walked::default());
+    let (lines, mut walked) = (BTreeMap::new(), Walked::default());
+    walked.is_collection = input.is_of_a_collection();
+    input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let ports = input.is_of_a_collection().then(Vec::new);
     let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, go_on };
     let result = match input.has_times() {
@@ -123,9 +140,14 @@ struct Walk<G> {
     go_on: G,
 }
 
-/// An interface as its files describe it: its name, link type and number there. Two of one name in
-/// a file are two lines.
-type Port = (Option<String>, u16, usize);
+/// An interface of a collection. Two of one name in a file are two lines, and so are those of files
+/// in different folders.
+struct Port {
+    /// As its files describe it: folder and name, link type, and number in its section.
+    described: (String, u16, usize),
+    /// What tells it apart from the others.
+    name: Rc<str>,
+}
 
 /// What an interface was connected to.
 struct Line {
@@ -152,6 +174,8 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
         let (path, folder) = (input.path().map(ToOwned::to_owned), input.folder().to_owned());
         let mut reader = Reader::new(input);
         let (mut section, mut last) = (0, None);
+        // Lines are recorded at the same time.
+        self.latest = 0;
         loop {
             self.number += 1;
             match last.filter(|_| reader.waits()) {
@@ -164,7 +188,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 Ok(Some(packet)) => packet,
                 Ok(None) => return Ok(true),
                 Err(problem) => {
-                    self.walked.cut.get_or_insert(problem.failure(path));
+                    self.walked.miss(problem.failure(path));
                     return Ok(true);
                 }
             };
@@ -172,9 +196,9 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 section = packet.section;
                 self.end_lines(sheet);
             }
-            let interface = match &mut self.ports {
-                Some(ports) => number_of(ports, &packet),
-                None => packet.interface,
+            let (interface, name) = match &mut self.ports {
+                Some(ports) => number_of(ports, &folder, &packet),
+                None => (packet.interface, Rc::default()),
             };
             let line = match self.lines.entry(interface) {
                 Entry::Occupied(known) => known.into_mut(),
@@ -184,7 +208,6 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         None => protocol_of(&packet)?,
                     };
                     self.choice.permits(protocol)?;
-                    let name = name_of(&folder, &packet);
                     new.insert(Line::new(protocol, Some(interface), name))
                 }
             };
@@ -214,7 +237,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
             return Err(Failure::Usage(line.to_owned()));
         };
         self.choice.permits(protocol)?;
-        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, "".into()));
+        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, Rc::default()));
         loop {
             let bytes = match input.read() {
                 Ok([]) => return Ok(()),
@@ -287,25 +310,28 @@ impl Line {
     }
 }
 
-/// Its name in a collection: the folders of the file, if not all are in the same, and the port.
-fn name_of(folder: &Path, packet: &Packet<'_>) -> Rc<str> {
-    let port = match &packet.described.name {
+/// Number and name of its port.
+fn number_of(ports: &mut Vec<Port>, folder: &Path, packet: &Packet<'_>) -> (usize, Rc<str>) {
+    let Packet { described, number, .. } = packet;
+    let port = match &described.name {
+        // Readers of exports would take it for a number, and 007 for 7.
+        Some(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => format!("port {name}"),
         Some(name) => name.strip_prefix("/dev/").unwrap_or(name).to_owned(),
-        None => format!("interface {}", packet.interface),
+        None => format!("interface {number}"),
     };
     let parts = folder.iter().map(|part| part.to_string_lossy().into_owned());
-    parts.chain([port]).collect::<Vec<_>>().join("/").into()
-}
-
-/// The number of its port.
-fn number_of(ports: &mut Vec<Port>, packet: &Packet<'_>) -> usize {
-    let Packet { described, interface, .. } = packet;
-    let port = (described.name.clone(), described.link_type, *interface);
-    let known = ports.iter().position(|known| *known == port);
-    known.unwrap_or_else(|| {
-        ports.push(port);
+    let port = parts.chain([port]).collect::<Vec<_>>().join("/");
+    let port = (port, described.link_type, *number);
+    let at = ports.iter().position(|known| known.described == port).unwrap_or_else(|| {
+        let is_like = |other: &Port| other.described.0 == port.0 && other.described.2 != port.2;
+        let name = match ports.iter().any(is_like) {
+            true => format!("{} (interface {number})", port.0),
+            false => port.0.clone(),
+        };
+        ports.push(Port { described: port, name: name.into() });
         ports.len() - 1
-    })
+    });
+    (at, ports.get(at).map(|port| Rc::clone(&port.name)).unwrap_or_default())
 }
 
 /// The protocol of a packet, by the link type of its interface.

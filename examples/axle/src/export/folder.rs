@@ -119,13 +119,9 @@ impl<'a, F: TableFile> Folder<'a, F> {
 /// The folders of a partition, such as `day=2026-11-27/line=rover-1%2FttyS4`, which Spark, DuckDB
 /// and others read as two columns.
 fn folders_of(partition: &Partition) -> String {
-    let day = partition.day.map_or_else(
-        || "__HIVE_DEFAULT_PARTITION__".to_owned(),
-        |day| {
-            let time = UNIX_EPOCH + Duration::from_secs(day * 24 * 60 * 60);
-            humantime::format_rfc3339_seconds(time).to_string().chars().take(10).collect()
-        },
-    );
+    let time = UNIX_EPOCH + Duration::from_secs(partition.day * 24 * 60 * 60);
+    let day = humantime::format_rfc3339_seconds(time).to_string();
+    let day = day.get(..10).unwrap_or(&day);
     let mut folders = format!("day={day}/line=");
     for byte in partition.line.bytes() {
         match byte {

@@ -63,6 +63,8 @@ pub(crate) struct Packet<'a> {
     pub(crate) section: u64,
     /// Number of the interface, counted through all sections.
     pub(crate) interface: usize,
+    /// Its number in the section.
+    pub(crate) number: usize,
     pub(crate) described: &'a Interface,
     /// Microseconds since 1970; `None` if the block has no time.
     pub(crate) micros: Option<u64>,
@@ -218,6 +220,7 @@ impl<R: Read> Reader<R> {
                     return Ok(Some(Packet {
                         section: self.section,
                         interface: self.interfaces_before + found.interface,
+                        number: found.interface,
                         described,
                         micros: found.micros,
                         direction: found.direction,
@@ -267,6 +270,7 @@ impl<R: Read> Reader<R> {
         Ok(Some(Packet {
             section: self.section,
             interface: 0,
+            number: 0,
             described,
             micros: Some(u64::from(seconds) * 1_000_000 + described.unit.micros(fraction.into())),
             direction: None,

@@ -63,12 +63,12 @@ fn line(table: &Table, row: usize) -> Value {
 
 /// The rows of a capture, and the lines of its listing.
 fn both(path: &Path, named: Option<Protocol>) -> (Vec<Value>, Vec<Value>) {
-    let mut input = Input::open(vec![path.to_owned()], None, Form::default()).unwrap();
+    let mut input = Input::open_one(Some(path), Form::default()).unwrap();
     let chosen = decode::choose(&mut input, named).unwrap();
     let mut rows = Lines::default();
     decode::walk_into(&mut input, &chosen, &mut rows, || Ok(())).unwrap();
 
-    let mut input = Input::open(vec![path.to_owned()], None, Form::default()).unwrap();
+    let mut input = Input::open_one(Some(path), Form::default()).unwrap();
     let chosen = decode::choose(&mut input, named).unwrap();
     let mut sheet = Sheet::new(Some(Style::Json));
     chosen.walk(&mut input, &mut sheet, |_, _| Ok(())).unwrap();
