@@ -471,24 +471,6 @@ fn a_hold_that_was_perhaps_never_heard_is_measured_again_and_one_that_was_is_kep
 }
 
 #[test]
-fn a_hold_waits_for_the_read_behind_it_on_slow_lines_and_those_with_gaps() {
-    for (baud, gap) in [(300, US(50)), (1200, US(50)), (9600, US(50)), (500_000, MS(20))] {
-        let line = |config: &mut MasterConfig| {
-            (config.baud, config.turnaround_gap) = (baud, gap);
-        };
-        let mut desk = Desk::stopping(with(direct(), line), N3);
-        // A load pulls the shaft away from whatever it is to hold.
-        let sent = desk.follow(NodeId::N3, MS(3000), |at| {
-            Answer::Position(Position::from_counts(at as i32 / 10).unwrap())
-        });
-        let mut holds = writes(&sent.into_iter().map(|(_, packet)| packet).collect::<Vec<_>>());
-        assert!(holds.len() > 2, "{baud} bit/s");
-        holds.dedup();
-        assert_eq!(holds.len(), 1, "{baud} bit/s with a gap of {gap:?}");
-    }
-}
-
-#[test]
 fn an_answer_that_measures_a_hold_again_does_not_follow_the_write_of_the_old_one() {
     let mut desk = Desk::stopping_at(direct(), turns(40));
     while writes(&desk.sent).is_empty() {

@@ -494,11 +494,9 @@ impl<B: Board> Stop<B> {
         self.lost_attempts
     }
 
-    /// Whether it is written again, whatever else is due: not before its first WRITE, and a
-    /// position not before the first answer behind it. That READ would come later, and the position
-    /// be measured anew in the meantime.
+    /// Whether it is written again, whatever else is due: not before its first WRITE.
     pub(super) fn is_repeated(&self) -> bool {
-        self.followed > 0 || self.written_at.is_some() && !self.is_there
+        self.stage == Stage::Confirmed || self.written_at.is_some()
     }
 
     /// When it is; `None` for at once.
