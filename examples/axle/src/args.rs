@@ -157,16 +157,22 @@ pub(crate) fn seconds(text: &str) -> Result<u64, String> {
     Ok((seconds * 1e6) as u64)
 }
 
-/// A time of up to a minute.
-pub(crate) fn short_time(text: &str) -> Result<Duration, String> {
-    time_within(text, 0.0)
+/// How long a motor may coast.
+pub(crate) fn coast(text: &str) -> Result<Duration, String> {
+    time_within(text, 0.0, 60.0)
 }
 
-/// A time from `least` seconds to a minute.
-pub(crate) fn time_within(text: &str, least: f64) -> Result<Duration, String> {
-    match seconds(text)?.try_into().map(Duration::from_micros) {
-        Ok(time) if (least..=60.0).contains(&(f64::from(time.as_micros()) / 1e6)) => Ok(time),
-        _ => Err(format!("it is not within {least}..=60 seconds")),
+/// A gap between packets: a stop waits for some dozens of them.
+pub(crate) fn gap(text: &str) -> Result<Duration, String> {
+    time_within(text, 0.0, 0.02)
+}
+
+/// A time from `least` to `most` seconds.
+pub(crate) fn time_within(text: &str, least: f64, most: f64) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (least..=most).contains(&seconds) {
+        true => Ok(Duration::from_micros((seconds * 1e6) as u32)),
+        false => Err(format!("it is not within {least}..={most} seconds")),
     }
 }
 

@@ -74,12 +74,12 @@ pub(crate) struct MasterArgs {
     #[arg(long, value_name = "TIME")]
     reply_timeout: Option<Patience>,
 
-    /// Silence between two packets, seconds, for transceivers that need it
-    #[arg(long, value_name = "SECONDS", value_parser = args::short_time)]
+    /// Silence between two packets, seconds, at most 0.02, for transceivers that need it
+    #[arg(long, value_name = "SECONDS", value_parser = args::gap)]
     gap: Option<Duration>,
 
     /// How long a motor may turn on after its stop is confirmed, seconds; by default 2
-    #[arg(long, value_name = "SECONDS", value_parser = args::short_time)]
+    #[arg(long, value_name = "SECONDS", value_parser = args::coast)]
     coast: Option<Duration>,
 
     /// The adapter hears what it sends, as on two wires with the receiver always on: take these

@@ -346,9 +346,10 @@ pub(crate) fn folder_of(file: &Path) -> PathBuf {
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// Whether bytes begin as telnet does: with what a server offers and asks for.
+/// Whether bytes begin as telnet does: with two of the options that a server offers and asks for,
+/// so that a part of a frame is not taken for it.
 pub(crate) const fn is_telnet(front: &[u8]) -> bool {
-    matches!(front, [0xFF, 0xFB..=0xFE, ..])
+    matches!(front, [0xFF, 0xFB..=0xFE, 0..=49, 0xFF, 0xFB..=0xFE, 0..=49, ..])
 }
 
 /// A bar on standard error, if that is a terminal and the listing does not go to the terminal too.

@@ -172,7 +172,8 @@ impl Rover {
     /// Failures of the port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, before) = (self.now(), self.host().statistics().commands);
-        let end = self.session.awake() + STOP_PATIENCE;
+        let give_up = self.session.awake() + STOP_PATIENCE;
+        let mut end = give_up;
         // When the stop was flushed; the number of reports before the robot had heard of it, and
         // when it had.
         let (mut told, mut unheard) = (None, None);
@@ -197,10 +198,13 @@ impl Rover {
             if result.is_ok() && is_news && progress == StopProgress::StandingStill {
                 return Ok(());
             }
-            if self.session.awake() >= end {
+            let awake = self.session.awake();
+            if awake >= end || result.is_err() && awake >= give_up {
                 break result.err();
             }
             if result.is_err() {
+                // If the port comes back, there is as much time as before.
+                end = awake + STOP_PATIENCE;
                 clock::sleep(FAILURE_PAUSE);
             }
         };

@@ -132,3 +132,16 @@ fn every_default_is_as_it_is_written_here() {
     ];
     assert_eq!(motion.collect::<Vec<_>>(), expected);
 }
+
+#[test]
+fn a_gap_is_short_and_a_time_to_coast_is_not_endless() {
+    let micros = |time: Duration| time.as_micros();
+    assert_eq!([gap("0"), gap("0.02")].map(|it| it.map(micros)), [Ok(0), Ok(20_000)]);
+    assert_eq!(coast("60").map(micros), Ok(60_000_000));
+    for text in ["0.03", "1", "-1", "1e12"] {
+        assert_eq!(gap(text).unwrap_err(), "it is not within 0..=0.02 seconds");
+    }
+    for text in ["61", "-1", "1e12", "NaN"] {
+        assert_eq!(coast(text).unwrap_err(), "it is not within 0..=60 seconds");
+    }
+}

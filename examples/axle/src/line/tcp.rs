@@ -241,16 +241,18 @@ mod tests {
     #[test]
     fn a_server_that_speaks_telnet_is_refused() {
         let (mut port, mut server) = pair();
-        // It offers to suppress "go ahead".
-        server.write_all(&[0xFF, 0xFB, 3]).unwrap();
+        // It offers to suppress "go ahead", and to echo.
+        let offers = [0xFF, 0xFB, 3, 0xFF, 0xFB, 1];
+        server.write_all(&offers).unwrap();
         let error = port.wait(Duration::from_secs(10)).unwrap_err().to_string();
         assert!(error.contains("it speaks telnet"), "{error}");
         let (mut port, mut server) = pair();
-        for bytes in [[0xFD, 0xFF], [0xFF, 0xFB]] {
+        // In the middle they mean nothing, and negative numbers are none.
+        for bytes in [[0xFF, 0xFE, 0xFF, 0xFD, 0xFF, 0xFF], offers] {
             server.write_all(&bytes).unwrap();
-            assert!(port.wait(Duration::from_secs(10)).unwrap(), "in the middle they mean nothing");
-            let mut buffer = [0; 2];
-            assert_eq!((port.read(&mut buffer).unwrap(), buffer), (2, bytes));
+            assert!(port.wait(Duration::from_secs(10)).unwrap());
+            let mut buffer = [0; 6];
+            assert_eq!((port.read(&mut buffer).unwrap(), buffer), (6, bytes));
         }
     }
 

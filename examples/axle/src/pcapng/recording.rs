@@ -322,6 +322,13 @@ impl core::str::FromStr for Rotation {
     fn from_str(text: &str) -> Result<Self, String> {
         const LEAST: &str = "at least 10kB or 1s";
         let (number, factor) = match text.strip_suffix('B') {
+            // humantime's M is a month.
+            None if text.ends_with('M') => {
+                return Err(format!(
+                    "write {text}B for a size, or {}min",
+                    text.trim_end_matches('M')
+                ));
+            }
             None => {
                 let time = humantime::parse_duration(text)
                     .map_err(|_| "expected a size or a time, such as 100MB or 1h".to_owned())?;

@@ -169,7 +169,9 @@ fn sizes_and_times_of_files_are_read_as_they_are_written_by_hand() {
     ] {
         assert_eq!(text.parse(), Ok(expected), "{text}");
     }
-    for text in ["", "100", "1 kB", "-1MB", "NaNMB", "MB", "1ms", "soon", "1€B", "1TBB"] {
+    for text in
+        ["10M", "1M", "", "100", "1 kB", "-1MB", "NaNMB", "MB", "1ms", "soon", "1€B", "1TBB"]
+    {
         assert!(text.parse::<Rotation>().is_err(), "{text}");
     }
 }

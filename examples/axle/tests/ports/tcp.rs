@@ -81,11 +81,12 @@ fn a_tcp_server_that_goes_away_is_told_with_what_may_be_moving() {
 
 #[test]
 fn a_tcp_server_that_closes_the_connection_and_takes_another_is_told_and_what_moves_is_stopped() {
-    for (device, command, moves, rests) in [
-        (TWO_NODES, "spin --node 1 --rps 2", "node 1: command 2.00 rps", "node 1: at rest"),
-        ("ucp", "drive --speed 50", "command: speed 50 %, turn 0 %", "at rest after"),
+    let (bus, rover) = ("spin --node 1 --rps 2", "drive --speed 50");
+    for (device, command, moves, rests, pauses) in [
+        (TWO_NODES, bus, "node 1: command 2.00 rps", "node 1: at rest", [0, 500]),
+        ("ucp", rover, "command: speed 50 %, turn 0 %", "at rest after", [0, 3000]),
     ] {
-        for pause in [0, 500] {
+        for pause in pauses {
             let (sim, port) = sim(device);
             let server = Server::start(&port);
             let process = Process::start(&format!("{command} --for 600 -p {}", server.address));
