@@ -10,7 +10,7 @@ use std::{
 };
 
 use axlewire::{
-    ikeya::{NodeId, ReadRequest},
+    ikeya::{NodeId, Position, PositionResponse, ReadRequest, WriteRequest},
     ucp::{Body, message::Ping},
 };
 use flate2::{Compression, write::GzEncoder};
@@ -219,6 +219,25 @@ fn a_file_is_read_once_however_it_is_named() {
     let output = axle(&["decode", &path, &again, c.to_str().unwrap()]).output().unwrap();
     let listing = String::from_utf8(output.stdout).unwrap();
     assert!(listing.contains(" in 9 frames"), "{listing}");
+}
+
+#[test]
+fn a_node_keeps_its_mode_from_one_file_of_a_line_to_the_next() {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("modes");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let answer = *PositionResponse::new(NodeId::N1, Position::new(0, 1)).as_bytes();
+    let write = *WriteRequest::position(NodeId::N1, Position::new(0, 2)).as_bytes();
+    for (name, at, direction, bytes) in [("a", 1_000_000, 1, answer), ("b", 2_000_000, 2, write)] {
+        let file = PcapNg::new(147, &[(at, direction, &bytes)]).0;
+        fs::write(folder.join(format!("{name}.pcapng")), file).unwrap();
+    }
+    let path = folder.to_str().unwrap();
+    for command in [&["decode"][..], &["replay", "--dry-run"]] {
+        let output = axle(&[command, &[path]].concat()).output().unwrap();
+        let listing = String::from_utf8(output.stdout).unwrap();
+        assert!(listing.contains("2.0000 turns") && !listing.contains(" rps"), "{listing}");
+    }
 }
 
 #[test]

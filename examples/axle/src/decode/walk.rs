@@ -147,6 +147,8 @@ struct Port {
     described: (String, u16, usize),
     /// What tells it apart from the others.
     name: Rc<str>,
+    /// The modes of its nodes at the end of a file: the next one goes on with them.
+    modes: Modes,
 }
 
 /// What an interface was connected to.
@@ -196,9 +198,9 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 section = packet.section;
                 self.end_lines(sheet);
             }
-            let (interface, name) = match &mut self.ports {
+            let interface = match &mut self.ports {
                 Some(ports) => number_of(ports, &folder, &packet),
-                None => (packet.interface, Rc::default()),
+                None => packet.interface,
             };
             let line = match self.lines.entry(interface) {
                 Entry::Occupied(known) => known.into_mut(),
@@ -208,7 +210,8 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         None => protocol_of(&packet)?,
                     };
                     self.choice.permits(protocol)?;
-                    new.insert(Line::new(protocol, Some(interface), name))
+                    let port = self.ports.as_ref().and_then(|ports| ports.get(interface));
+                    new.insert(Line::new(protocol, Some(interface), port))
                 }
             };
             let micros = self.walked.time(packet.micros, self.number);
@@ -237,7 +240,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
             return Err(Failure::Usage(line.to_owned()));
         };
         self.choice.permits(protocol)?;
-        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, Rc::default()));
+        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, None));
         loop {
             let bytes = match input.read() {
                 Ok([]) => return Ok(()),
@@ -266,16 +269,21 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
     /// Lists what is left of all lines: nothing more will come on them.
     fn end_lines(&mut self, sheet: &mut Sheet) {
         let walked = &mut self.walked;
-        for mut line in core::mem::take(&mut self.lines).into_values() {
+        for (interface, mut line) in core::mem::take(&mut self.lines) {
             walked.account += line.finish(sheet);
             walked.modes = line.modes;
+            if let Some(port) = self.ports.as_mut().and_then(|ports| ports.get_mut(interface)) {
+                port.modes = line.modes;
+            }
         }
     }
 }
 
 impl Line {
-    fn new(protocol: Protocol, interface: Option<usize>, name: Rc<str>) -> Self {
-        Self { protocol, interface, name, modes: Modes::default(), streams: BTreeMap::new() }
+    fn new(protocol: Protocol, interface: Option<usize>, port: Option<&Port>) -> Self {
+        let (name, modes) =
+            port.map(|port| (Rc::clone(&port.name), port.modes)).unwrap_or_default();
+        Self { protocol, interface, name, modes, streams: BTreeMap::new() }
     }
 
     fn feed(
@@ -310,8 +318,8 @@ impl Line {
     }
 }
 
-/// Number and name of its port.
-fn number_of(ports: &mut Vec<Port>, folder: &Path, packet: &Packet<'_>) -> (usize, Rc<str>) {
+/// The number of its port.
+fn number_of(ports: &mut Vec<Port>, folder: &Path, packet: &Packet<'_>) -> usize {
     let Packet { described, number, .. } = packet;
     let port = match &described.name {
         // Readers of exports would take it for a number, and 007 for 7.
@@ -322,16 +330,15 @@ fn number_of(ports: &mut Vec<Port>, folder: &Path, packet: &Packet<'_>) -> (usiz
     let parts = folder.iter().map(|part| part.to_string_lossy().into_owned());
     let port = parts.chain([port]).collect::<Vec<_>>().join("/");
     let port = (port, described.link_type, *number);
-    let at = ports.iter().position(|known| known.described == port).unwrap_or_else(|| {
+    ports.iter().position(|known| known.described == port).unwrap_or_else(|| {
         let is_like = |other: &Port| other.described.0 == port.0 && other.described.2 != port.2;
         let name = match ports.iter().any(is_like) {
             true => format!("{} (interface {number})", port.0),
             false => port.0.clone(),
         };
-        ports.push(Port { described: port, name: name.into() });
+        ports.push(Port { described: port, name: name.into(), modes: Modes::default() });
         ports.len() - 1
-    });
-    (at, ports.get(at).map(|port| Rc::clone(&port.name)).unwrap_or_default())
+    })
 }
 
 /// The protocol of a packet, by the link type of its interface.

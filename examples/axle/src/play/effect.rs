@@ -194,7 +194,7 @@ impl Write {
     }
 
     /// The speeds, if they are slow enough.
-    fn slow(&self, max_rps: Rps) -> Result<Vec<Rps>, String> {
+    pub(super) fn slow(&self, max_rps: Rps) -> Result<Vec<Rps>, String> {
         let slow = |&rps: &f32| {
             let within = Rps::new(rps).ok().filter(|rps| rps.get().abs() <= max_rps.get());
             within.ok_or_else(|| {

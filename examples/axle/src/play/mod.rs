@@ -16,9 +16,13 @@ mod wheels;
 
 use std::io::{self, Write};
 
-use axlewire::ikeya::board::{OneMotor, ThreeMotors};
+use axlewire::ikeya::{
+    Mode,
+    board::{OneMotor, ThreeMotors},
+};
 
 use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals, teller::Teller};
+use effect::Effect;
 pub(crate) use effect::{Limits, Side, of as effect_of};
 use nodes::Nodes;
 pub(crate) use plan::{Due, Plan};
@@ -39,6 +43,11 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
 /// Lists the frames of a plan, at their times, without a port.
 pub(crate) fn list(plan: &Plan<'_>) -> Result<(), Failure> {
     announce(plan)?;
+    for due in &plan.frames {
+        if let (Effect::Write(write), Some(Mode::Velocity)) = (&due.effect, due.meant) {
+            write.slow(plan.limits.max_rps).map_err(Failure::Failed)?;
+        }
+    }
     let mut out = io::stdout().lock();
     lister::list(plan, &mut out).and_then(|()| out.flush()).map_err(Failure::Write)
 }
