@@ -40,9 +40,9 @@ fn open_all(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
                 Ok(micros) => timed.push((micros, file)),
                 Err(failure @ Failure::Open { .. }) if !is_folder => return Err(failure),
                 Err(Failure::Usage(line)) if !is_folder => {
-                    let line = format!("{line}: without times, give one file at a time");
-                    return Err(Failure::Usage(line));
+                    return Err(Failure::Usage(format!("{line}: give it alone")));
                 }
+                Err(Failure::Usage(line)) => left_out.push(Failure::Failed(line)),
                 Err(failure) => left_out.push(failure),
             }
         }
@@ -91,6 +91,11 @@ fn below(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 
 /// The time of the first packet; without one, the end of all times.
 fn first_time(path: &Path, form: Form) -> Result<u64, Failure> {
+    // What a pipe has cannot be read twice, and opening it may take forever.
+    let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
+    if !fs::metadata(path).map_err(cannot_open)?.is_file() {
+        return Err(Failure::Usage(format!("{path:?} is not a file")));
+    }
     let mut input = Input::open_one(Some(path), form)?;
     if input.peek(1, |_| false)?.is_empty() {
         return Err(Failure::Failed(format!("{path:?} is empty")));

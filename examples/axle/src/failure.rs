@@ -90,6 +90,14 @@ impl Failure {
         }
     }
 
+    /// Names the file that it is about.
+    pub(crate) fn in_file(self, path: &Path) -> Self {
+        match self {
+            Self::Failed(line) => Self::Failed(format!("{path:?}: {line}")),
+            other => other,
+        }
+    }
+
     /// Adds `besides` to the message of a failed operation, or of a port that was lost.
     pub(crate) fn and(self, besides: &str) -> Self {
         match self {

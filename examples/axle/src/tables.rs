@@ -30,7 +30,7 @@ use row::{Row, Slot};
 const BATCH: usize = 64 * 1024;
 
 /// Partitions after which all rows go to the sink.
-const MOST_PARTITIONS: usize = 32;
+const MOST_PARTITIONS: usize = 256;
 
 const DAY_US: u64 = 24 * 60 * 60 * 1_000_000;
 

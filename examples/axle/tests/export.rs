@@ -366,7 +366,7 @@ fn parquet_of_a_folder_has_a_file_per_table_day_and_line_and_is_replaced_as_a_wh
     let folder = folder("fleet");
     let read = bytes("aa01bed0");
     // An impossible time is none: that packet is in the day of the one before it.
-    for (rover, times) in [("a/b", &[0, DAY_US, 1][..]), ("c", &[DAY_US - 1, u64::MAX])] {
+    for (rover, times) in [("a/b", &[0, DAY_US, 1][..]), ("工場", &[DAY_US - 1, u64::MAX])] {
         let packets: Vec<_> = times.iter().map(|at| (*at, 1, &read[..])).collect();
         fs::create_dir_all(folder.join("in").join(rover)).unwrap();
         fs::write(folder.join("in").join(rover).join("x.pcapng"), PcapNg::new(147, &packets).0)
@@ -387,14 +387,14 @@ fn parquet_of_a_folder_has_a_file_per_table_day_and_line_and_is_replaced_as_a_wh
         }
         let expected = [
             "day=1970-01-01/line=a%2Fb%2Ftty0: 1",
-            "day=1970-01-01/line=c%2Ftty0: 1",
+            "day=1970-01-01/line=工場%2Ftty0: 1",
             "day=1970-01-02/line=a%2Fb%2Ftty0: 1",
         ];
         assert_eq!(found, expected);
         assert_eq!(names(&to), ["columns.csv", "ikeya.read_request.parquet"]);
     }
     // What is not of an export stays.
-    for foreign in ["x.odt", "day=1970-01-01/x", "day=1970-01-01/line=c%2Ftty0/x.parquet"] {
+    for foreign in ["x.odt", "day=1970-01-01/x", "day=1970-01-01/line=工場%2Ftty0/x.parquet"] {
         fs::write(table.join(foreign), "years of work").unwrap();
         let line = complaint(&export(from.to_str().unwrap(), &[], &to, &["--force"]), 1);
         assert!(
@@ -404,7 +404,7 @@ fn parquet_of_a_folder_has_a_file_per_table_day_and_line_and_is_replaced_as_a_wh
         fs::remove_file(table.join(foreign)).unwrap();
     }
     // A folder of one capture is one, too; a file is none.
-    let one = folder.join("in/c");
+    let one = folder.join("in/工場");
     assert!(export(one.to_str().unwrap(), &[], &to, &["--force"]).status.success());
     assert_eq!(names(&table.join("day=1970-01-01")), ["line=tty0"]);
     let file = one.join("x.pcapng");

@@ -280,16 +280,29 @@ fn a_bad_file_among_several_is_named_and_costs_nothing_of_the_others() {
     fs::write(folder.join("empty.pcapng"), []).unwrap();
     fs::write(folder.join("cut.pcapng.gz"), &packed(&cut)[..5]).unwrap();
     fs::write(folder.join("odd.pcap"), "years of work").unwrap();
+    let ethernet = PcapNg::new(1, &[(4_000_000, 1, &[0; 60])]).0;
+    fs::write(folder.join("net.pcapng"), ethernet).unwrap();
+    let pipe = folder.join("pipe.pcap");
+    #[cfg(unix)]
+    std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    #[cfg(not(unix))]
+    fs::write(&pipe, []).unwrap();
     let output = axle(&["decode", "--json", &path]).output().unwrap();
     let [out, error] = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap());
     assert_eq!(output.status.code(), Some(1));
-    let names =
-        ["c.pcapng", "empty.pcapng\" is empty", "cut.pcapng.gz", "odd.pcap\" is no pcapng or pcap"];
+    let names = [
+        "c.pcapng",
+        "empty.pcapng\" is empty",
+        "cut.pcapng.gz",
+        "odd.pcap\" is no pcapng or pcap",
+        "net.pcapng\": interface 0",
+        "pipe.pcap\" is",
+    ];
     for name in names {
         assert_eq!(error.matches(name).count(), 1, "{name}: {error}");
     }
     assert_eq!(out.lines().filter(|line| line.contains("\"ping\"")).count(), 9, "{out}");
-    for name in ["empty.pcapng", "cut.pcapng.gz", "odd.pcap"] {
+    for name in ["empty.pcapng", "cut.pcapng.gz", "odd.pcap", "net.pcapng", "pipe.pcap"] {
         fs::remove_file(folder.join(name)).unwrap();
     }
     // Raw bytes have no times, and a folder without captures has nothing.

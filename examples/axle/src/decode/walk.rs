@@ -1,7 +1,7 @@
 //! All packets of a capture, with times or without, each fed to the stream it belongs to.
 
 use std::{
-    collections::{BTreeMap, btree_map::Entry},
+    collections::{BTreeMap, BTreeSet, btree_map::Entry},
     path::Path,
     rc::Rc,
 };
@@ -113,7 +113,8 @@ pub(crate) fn walk(
     walked.is_collection = input.is_of_a_collection();
     input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let ports = input.is_of_a_collection().then(Vec::new);
-    let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, go_on };
+    let foreign = BTreeSet::new();
+    let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, foreign, go_on };
     let result = match input.has_times() {
         Ok(true) => walk.packets(input, sheet),
         Ok(false) => walk.raw(input, sheet),
@@ -137,6 +138,8 @@ struct Walk<G> {
     /// In a collection: what each interface is. The numbers of the files do not tell the lines
     /// apart.
     ports: Option<Vec<Port>>,
+    /// Those of them that are no lines of a known protocol.
+    foreign: BTreeSet<usize>,
     go_on: G,
 }
 
@@ -207,7 +210,18 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 Entry::Vacant(new) => {
                     let protocol = match self.choice.protocol {
                         Some(protocol) => protocol,
-                        None => protocol_of(&packet)?,
+                        None => match protocol_of(&packet) {
+                            Ok(protocol) => protocol,
+                            Err(failure) if self.ports.is_some() => {
+                                // Told once.
+                                if self.foreign.insert(interface) {
+                                    let path = path.as_deref().unwrap_or(Path::new(""));
+                                    self.walked.miss(failure.in_file(path));
+                                }
+                                continue;
+                            }
+                            Err(failure) => return Err(failure),
+                        },
                     };
                     self.choice.permits(protocol)?;
                     let port = self.ports.as_ref().and_then(|ports| ports.get(interface));

@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fmt::Display,
     fs::{self, File},
+    hash::{DefaultHasher, Hash, Hasher},
     io::{self, Write},
     mem,
     path::{Path, PathBuf},
@@ -51,6 +52,9 @@ pub(super) fn export<F: TableFile>(mut job: Job<'_>) -> Result<Walked, Failure> 
 
 /// Files that are open at a time: systems allow 256 or more.
 const MOST_OPEN: usize = 200;
+
+/// Longest name of a line, bytes: systems allow 255 with all that is added.
+const LONGEST_NAME: usize = 200;
 
 pub(super) struct Folder<'a, F> {
     path: PathBuf,
@@ -122,15 +126,26 @@ fn folders_of(partition: &Partition) -> String {
     let time = UNIX_EPOCH + Duration::from_secs(partition.day * 24 * 60 * 60);
     let day = humantime::format_rfc3339_seconds(time).to_string();
     let day = day.get(..10).unwrap_or(&day);
-    let mut folders = format!("day={day}/line=");
-    for byte in partition.line.bytes() {
-        match byte {
-            b'-' | b'.' | b'_' => folders.push(byte.into()),
-            _ if byte.is_ascii_alphanumeric() => folders.push(byte.into()),
-            _ => folders.push_str(&format!("%{byte:02X}")),
+    let mut line = String::new();
+    for char in partition.line.chars() {
+        match char {
+            // What is left is told apart by a number that is made of it.
+            _ if line.len() > LONGEST_NAME => {
+                let mut hasher = DefaultHasher::new();
+                partition.line.hash(&mut hasher);
+                line.push_str(&format!("~{:016x}", hasher.finish()));
+                break;
+            }
+            '-' | '.' | '_' => line.push(char),
+            _ if char.is_alphanumeric() => line.push(char),
+            _ => {
+                for byte in char.encode_utf8(&mut [0; 4]).bytes() {
+                    line.push_str(&format!("%{byte:02X}"));
+                }
+            }
         }
     }
-    folders
+    format!("day={day}/line={line}")
 }
 
 /// The lines of a table in the list of columns.

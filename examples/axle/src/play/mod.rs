@@ -49,7 +49,12 @@ pub(crate) fn list(plan: &Plan<'_>) -> Result<(), Failure> {
         }
     }
     let mut out = io::stdout().lock();
-    lister::list(plan, &mut out).and_then(|()| out.flush()).map_err(Failure::Write)
+    lister::list(plan, &mut out).map_err(Failure::Write)?;
+    if let Some(summary) = plan.summary.filter(|_| !plan.is_json) {
+        let line = summary.of_dry_run(plan.frames.len(), plan.side);
+        writeln!(out, "{line}").map_err(Failure::Write)?;
+    }
+    out.flush().map_err(Failure::Write)
 }
 
 /// Refuses a plan that would do harm, and says what is not as one would expect.

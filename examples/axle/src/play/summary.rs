@@ -41,6 +41,17 @@ impl Summary {
         if self.sent > 0 {
             line += &format!(", at most {:.1} ms late", f64::from(self.late_us) / 1e3);
         }
+        line + &self.rest(side)
+    }
+
+    /// The end of a dry run with this many frames.
+    pub(super) fn of_dry_run(&self, frames: usize, side: Side) -> String {
+        format!("{} would be sent{}", counted(frames, "frame"), self.rest(side))
+    }
+
+    /// What was not sent, and why.
+    fn rest(&self, side: Side) -> String {
+        let mut line = String::new();
         let other = match side {
             Side::Commander => "of the other side, which answers",
             Side::Device => "of the other side, which asks",
