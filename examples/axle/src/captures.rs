@@ -17,16 +17,16 @@ const EXTENSIONS: [&str; 4] = [".pcapng", ".pcap", ".pcapng.gz", ".pcap.gz"];
 
 /// Opens files and folders of captures, or standard input for none and `-`.
 pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
-    let [path] = paths else { return open_all(paths, form) };
-    if path.is_dir() { open_all(paths, form) } else { Input::open_one(Some(path), form) }
+    match paths {
+        [] => Input::open_one(None, form),
+        [path] if !path.is_dir() => Input::open_one(Some(path), form),
+        paths => open_all(paths, form),
+    }
 }
 
 /// Opens a collection: in the order of the times of the first packets, then of their names. All
 /// must be captures with times; of what is damaged from its first bytes on, the failures are kept.
 fn open_all(paths: &[PathBuf], form: Form) -> Result<Input, Failure> {
-    if paths.is_empty() {
-        return Input::open_one(None, form);
-    }
     let (mut timed, mut left_out, mut seen) = (Vec::new(), Vec::new(), BTreeSet::new());
     for path in paths {
         let is_folder = path.is_dir();

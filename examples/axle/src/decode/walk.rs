@@ -110,9 +110,9 @@ pub(crate) fn walk(
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
     let (lines, mut walked) = (BTreeMap::new(), Walked::default());
-    walked.is_collection = input.is_of_a_collection();
-    input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let ports = input.is_of_a_collection().then(Vec::new);
+    walked.is_collection = ports.is_some();
+    input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let foreign = BTreeSet::new();
     let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, foreign, go_on };
     let result = match input.has_times() {
@@ -176,9 +176,11 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
 
     /// The packets of a file; returns whether to go on.
     fn packets_of_one(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<bool, Failure> {
-        let (path, folder) = (input.path().map(ToOwned::to_owned), input.folder().to_owned());
+        let (path, folder) = (input.path().map(ToOwned::to_owned), input.folder());
         let mut reader = Reader::new(input);
         let (mut section, mut last) = (0, None);
+        // By the number in the file: it is looked up once, not for each packet.
+        let mut numbers = BTreeMap::new();
         // Lines are recorded at the same time.
         self.latest = 0;
         loop {
@@ -202,7 +204,9 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 self.end_lines(sheet);
             }
             let interface = match &mut self.ports {
-                Some(ports) => number_of(ports, &folder, &packet),
+                Some(ports) => *numbers
+                    .entry(packet.interface)
+                    .or_insert_with(|| number_of(ports, &folder, &packet)),
                 None => packet.interface,
             };
             let line = match self.lines.entry(interface) {
