@@ -162,6 +162,17 @@ impl<B: Boards> Bus<B> {
         Ok(!signals.is_raised())
     }
 
+    /// Listens for a second, or until an answer comes that is too late: for a line on which nothing
+    /// was heard so far.
+    pub(crate) fn listen(&mut self, signals: &Signals) -> Result<(), Failure> {
+        let end = self.now() + SLOW_TIMEOUT + SLOW_TIMEOUT;
+        let is_late = |bus: &Self| NodeId::ALL.into_iter().any(|node| bus.late(node) > 0);
+        while self.now() < end && !is_late(self) && !signals.is_raised() {
+            self.look()?;
+        }
+        Ok(())
+    }
+
     /// Begins anew with half a second for answers, if an id gives only answers that are too late;
     /// from then on with the ids that may have answered.
     ///

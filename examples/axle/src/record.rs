@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     io::{self, IsTerminal, Write},
-    path::{Path, PathBuf},
+    path::{Path, PathBuf, is_separator},
     time::{Duration, Instant},
 };
 
@@ -88,9 +88,10 @@ where
     let is_piped = args.output == Path::new("-");
     let line = Line::connect(&args.port, baud)?;
     let file = match args.rotate {
-        Some(_) if is_piped => {
-            let line = "--rotate goes on in another file: name one instead of standard output";
-            return Err(Failure::Usage(line.to_owned()));
+        Some(_) if !is_name_of_files(&args.output) => {
+            let output = &args.output;
+            let line = format!("--rotate writes several files: {output:?} is no name for them");
+            return Err(Failure::Usage(line));
         }
         Some(rotation) => {
             let of = (args.protocol, line.path(), baud);
@@ -115,6 +116,13 @@ where
         .map_err(Failure::Write)?;
     }
     outcome
+}
+
+/// Whether files can be named after it: it is no folder, no device and not standard output.
+fn is_name_of_files(path: &Path) -> bool {
+    let last = path.as_os_str().as_encoded_bytes().last();
+    let is_folder = last.is_none_or(|last| is_separator(*last as char));
+    path != Path::new("-") && !is_folder && (path.is_file() || !path.exists())
 }
 
 /// What has become of a recording.

@@ -107,21 +107,35 @@ fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     let mut bus = Bus::<B>::open(&args.bus)?;
     discover(&mut bus, &signals)?;
+    if bus.nodes().next().is_none() {
+        bus.listen(&signals)?;
+    }
     let (mut needs, mut times) = (None, Vec::new());
     if args.bus.may_wait_longer() && bus.wait_longer() {
         discover(&mut bus, &signals)?;
         needs = bus.needed_patience();
     }
-    if args.measure {
+    let found = still_there(&bus);
+    if args.measure && found > 0 {
         times = measure::measure(&mut bus, &signals)?;
         needs = measure::proposal(&times);
     }
     match args.json {
         true => print_json(&bus, needs, times, &mut io::stdout().lock()),
-        false => print_table(&bus, needs, &times, &mut anstream::stdout().lock()),
+        false => print_table(&bus, found, needs, &times, &mut anstream::stdout().lock()),
     }
     .map_err(Failure::Write)?;
-    bus.check_recording()
+    bus.check_recording()?;
+    match found - still_there(&bus).min(found) {
+        0 => Ok(()),
+        1 => Err(Failure::Failed("1 node fell silent".to_owned())),
+        silent => Err(Failure::Failed(format!("{silent} nodes fell silent"))),
+    }
+}
+
+/// Number of nodes that have answered and still do.
+fn still_there<B: Boards>(bus: &Bus<B>) -> usize {
+    bus.nodes().filter(|(node, ..)| bus.is_online(*node)).count()
 }
 
 fn discover<B: Boards>(bus: &mut Bus<B>, signals: &Signals) -> Result<(), Failure> {
@@ -163,6 +177,7 @@ fn print_json<B: Boards>(
 
 fn print_table<B: Boards>(
     bus: &Bus<B>,
+    found: usize,
     needs: Option<Patience>,
     times: &[Times],
     out: &mut dyn Write,
@@ -203,6 +218,9 @@ fn print_table<B: Boards>(
     let are =
         |kind: fn(&Bus<B>, NodeId) -> u32| NodeId::ALL.into_iter().any(|id| kind(bus, id) > 0);
     match (count, damaged.is_empty()) {
+        _ if still_there(bus) < found => {
+            writeln!(out, "{} of {found} nodes still answer.", still_there(bus))
+        }
         (0, _) if are(Bus::late) => writeln!(
             out,
             "No node answers in time on {path:?}, but later: use a longer --reply-timeout, or --measure."

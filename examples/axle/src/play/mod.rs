@@ -50,8 +50,12 @@ pub(crate) fn list(plan: &Plan<'_>) -> Result<(), Failure> {
     }
     let mut out = io::stdout().lock();
     lister::list(plan, &mut out).map_err(Failure::Write)?;
-    if let Some(summary) = plan.summary.filter(|_| !plan.is_json) {
-        let line = summary.of_dry_run(plan.frames.len(), plan.side);
+    if let Some(mut summary) = plan.summary {
+        summary.left = plan.frames.len();
+        let line = match plan.is_json {
+            true => summary.line(plan.side, true),
+            false => summary.of_dry_run(plan.side),
+        };
         writeln!(out, "{line}").map_err(Failure::Write)?;
     }
     out.flush().map_err(Failure::Write)

@@ -134,7 +134,7 @@ impl<V: Voice> Playing<'_, V> {
                     && let Some(due) = self.plan.frames.pop_front()
                 {
                     let is_sent = self.voice.give(&due, now)?;
-                    self.sum.count(is_sent, now - after(start, due.after_us));
+                    self.sum.count(is_sent, now - at);
                     end = after(now, self.plan.linger_us);
                     free_at = now + self.line_time(&due);
                     until = now;

@@ -10,7 +10,8 @@ use super::effect::Side;
 pub(crate) struct Summary {
     /// Frames that were sent.
     pub(super) sent: usize,
-    /// How much later than in the plan the latest of them was sent, microseconds.
+    /// How much later than its time the latest of them was sent, microseconds: the time in the
+    /// plan, or the end of the frame before it and its answer where the line is slower.
     pub(super) late_us: u32,
     /// Frames that did not leave whole, and those that are left.
     pub(super) lost: usize,
@@ -44,8 +45,9 @@ impl Summary {
         line + &self.rest(side)
     }
 
-    /// The end of a dry run with this many frames.
-    pub(super) fn of_dry_run(&self, frames: usize, side: Side) -> String {
+    /// The end of a dry run, which leaves all frames.
+    pub(super) fn of_dry_run(mut self, side: Side) -> String {
+        let frames = core::mem::take(&mut self.left);
         format!("{} would be sent{}", counted(frames, "frame"), self.rest(side))
     }
 

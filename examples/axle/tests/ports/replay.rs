@@ -42,7 +42,13 @@ fn capture(speeds: &[f32], mode_is_known: bool) -> String {
 fn a_dry_run_lists_what_would_be_sent_and_when_and_needs_no_port_and_no_permission_to_move() {
     let path = capture(&[2.0, -2.0, 0.0], true);
     let lines = Process::start(&format!("replay {path} --dry-run --speed 0.5 --json")).success();
-    let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let mut lines: Vec<Value> =
+        lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let summary = lines.pop().unwrap();
+    assert_eq!(
+        (&summary["event"], &summary["sent"], &summary["left"]),
+        (&"summary".into(), &0.into(), &3.into())
+    );
     let listed: Vec<_> = lines
         .iter()
         .map(|line| (line["t"].as_f64().unwrap(), line["rps"].as_f64().unwrap()))

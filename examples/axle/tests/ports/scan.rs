@@ -146,3 +146,28 @@ fn a_line_on_which_answers_come_late_is_scanned_moved_on_and_stopped_and_its_opt
         assert!(stop.stderr[0].starts_with("axle: answers come late: "), "{:?}", stop.stderr);
     }
 }
+
+#[test]
+fn a_line_on_which_answers_come_later_than_anything_waits_is_told_from_a_dead_one() {
+    let (_sim, port) = sim(&format!("{TWO_NODES} --delay 0.3"));
+    for measure in ["", "--measure"] {
+        let scan = Process::start(&format!("scan --port {port} {measure}")).success();
+        let [says] = scan.as_slice() else { panic!("{scan:?}") };
+        let expected = format!(
+            "No node answers in time on {port:?}, but later: use a longer --reply-timeout, \
+             or --measure."
+        );
+        assert_eq!(*says, expected);
+    }
+    let scan = Process::start(&format!("scan --reply-timeout 1 --port {port}")).success();
+    assert_eq!(scan.last().unwrap(), "2 nodes answer.");
+}
+
+#[test]
+fn nodes_that_fall_silent_while_they_are_measured_are_no_line_without_nodes() {
+    let (_sim, port) = sim(&format!("{TWO_NODES} --delay 0.005 --unplug 2.5:600"));
+    let scan = Process::start(&format!("scan --port {port} --measure")).end();
+    let says = "0 of 2 nodes still answer.".to_owned();
+    assert_eq!((scan.code, scan.stdout.last()), (Some(1), Some(&says)), "{scan:?}");
+    assert_eq!(scan.stderr, ["axle: 2 nodes fell silent"]);
+}
