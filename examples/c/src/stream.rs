@@ -1,0 +1,467 @@
+//! Decoders: bytes in, frames and gaps out.
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{Counters, Event, Framing, Reason},
+    ucp,
+};
+
+use crate::{
+    memory::{Memory, Out, enter, enter_with, init, read},
+    result::{AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
+};
+
+/// A frame or a gap.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct axle_stream_event {
+    /// One of `AXLE_STREAM_`.
+    pub kind: u8,
+    /// Why the first byte of a gap begins no frame: one of `AXLE_REASON_`; 0 for a frame.
+    pub reason: u8,
+    /// The frame, with a matching CRC, in the bytes that were handed in or in the decoder: valid
+    /// until either changes. Null for a gap.
+    pub bytes: *const u8,
+    /// Length of the frame, bytes; 0 for a gap.
+    pub length: usize,
+    /// Length of the gap, bytes; 0 for a frame.
+    pub skipped: u64,
+}
+
+/// A frame, whole and undamaged.
+pub const AXLE_STREAM_FRAME: u8 = 1;
+/// A gap: bytes that belong to no frame.
+pub const AXLE_STREAM_SKIPPED: u8 = 2;
+
+/// The CRC does not match.
+pub const AXLE_REASON_CRC: u8 = 1;
+/// Not the first bytes of a frame.
+pub const AXLE_REASON_HEADER: u8 = 2;
+/// A node id outside 1 to 8.
+pub const AXLE_REASON_ID: u8 = 3;
+/// A length that no frame has.
+pub const AXLE_REASON_LENGTH: u8 = 4;
+/// The line went quiet inside the frame.
+pub const AXLE_REASON_IDLE: u8 = 5;
+
+/// Account of a stream: each received byte is in a frame, in a gap, or still pending.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct axle_counters {
+    /// Bytes received.
+    pub received: u64,
+    /// Frames, and the bytes in them.
+    pub frames: u64,
+    /// Bytes in frames.
+    pub framed: u64,
+    /// Gaps between frames.
+    pub gaps: u64,
+    /// Bytes in gaps, by reason: CRC.
+    pub skipped_crc: u64,
+    /// By reason: header.
+    pub skipped_header: u64,
+    /// By reason: node id.
+    pub skipped_id: u64,
+    /// By reason: length.
+    pub skipped_length: u64,
+    /// By reason: silence inside a frame.
+    pub skipped_idle: u64,
+}
+
+impl From<Counters> for axle_counters {
+    fn from(counters: Counters) -> Self {
+        Self {
+            received: counters.received,
+            frames: counters.frames,
+            framed: counters.framed,
+            gaps: counters.gaps,
+            skipped_crc: counters.crc,
+            skipped_header: counters.header,
+            skipped_id: counters.id,
+            skipped_length: counters.length,
+            skipped_idle: counters.idle,
+        }
+    }
+}
+
+/// From the master to slaves with one motor.
+pub const AXLE_IKEYA_TO_SLAVE: u8 = 1;
+/// From slaves with one motor to the master.
+pub const AXLE_IKEYA_TO_MASTER: u8 = 2;
+/// Both directions of a bus of boards with one motor, as on two wires.
+pub const AXLE_IKEYA_BOTH_DIRECTIONS: u8 = 3;
+/// From the master to slaves with three motors.
+pub const AXLE_IKEYA3_TO_SLAVE: u8 = 4;
+/// From slaves with three motors to the master.
+pub const AXLE_IKEYA3_TO_MASTER: u8 = 5;
+/// Both directions of a bus of boards with three motors.
+pub const AXLE_IKEYA3_BOTH_DIRECTIONS: u8 = 6;
+
+/// A decoder of any framing of a motor bus.
+#[derive(Clone, Debug)]
+pub enum IkeyaDecoder {
+    /// One motor.
+    ToSlave(ikeya::Decoder<ikeya::ToSlave>),
+    /// One motor.
+    ToMaster(ikeya::Decoder<ikeya::ToMaster>),
+    /// One motor.
+    Both(ikeya::Decoder<ikeya::BothDirections>),
+    /// Three motors.
+    ToSlave3(three::Decoder<three::ToSlave>),
+    /// Three motors.
+    ToMaster3(three::Decoder<three::ToMaster>),
+    /// Three motors.
+    Both3(three::Decoder<three::BothDirections>),
+}
+
+/// Calls a method of the decoder, whatever its framing.
+macro_rules! of_framing {
+    ($decoder:expr, $inner:ident => $call:expr) => {
+        match $decoder {
+            IkeyaDecoder::ToSlave($inner) => $call,
+            IkeyaDecoder::ToMaster($inner) => $call,
+            IkeyaDecoder::Both($inner) => $call,
+            IkeyaDecoder::ToSlave3($inner) => $call,
+            IkeyaDecoder::ToMaster3($inner) => $call,
+            IkeyaDecoder::Both3($inner) => $call,
+        }
+    };
+}
+
+impl IkeyaDecoder {
+    fn new(framing: u8) -> Result<Self, axle_result> {
+        Ok(match framing {
+            AXLE_IKEYA_TO_SLAVE => Self::ToSlave(ikeya::Decoder::new()),
+            AXLE_IKEYA_TO_MASTER => Self::ToMaster(ikeya::Decoder::new()),
+            AXLE_IKEYA_BOTH_DIRECTIONS => Self::Both(ikeya::Decoder::new()),
+            AXLE_IKEYA3_TO_SLAVE => Self::ToSlave3(three::Decoder::new()),
+            AXLE_IKEYA3_TO_MASTER => Self::ToMaster3(three::Decoder::new()),
+            AXLE_IKEYA3_BOTH_DIRECTIONS => Self::Both3(three::Decoder::new()),
+            _ => return Err(AXLE_ERROR_VALUE),
+        })
+    }
+}
+
+/// What C calls of a decoder.
+pub(crate) trait Decode {
+    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event>;
+    fn push(&mut self, byte: u8) -> bool;
+    fn spare(&mut self) -> &mut [u8];
+    fn commit(&mut self, len: usize);
+    fn idle(&mut self);
+    fn pending(&self) -> usize;
+    fn counters(&self) -> Counters;
+}
+
+/// The frame of any framing as its bytes.
+trait Bytes {
+    fn bytes(&self) -> &[u8];
+}
+
+macro_rules! frames {
+    ($($frame:ty),*) => {
+        $(impl Bytes for $frame {
+            fn bytes(&self) -> &[u8] {
+                self.as_bytes()
+            }
+        })*
+    };
+}
+frames!(
+    ikeya::Request<'_>,
+    ikeya::Response<'_>,
+    ikeya::Packet<'_>,
+    three::Request<'_>,
+    three::Response<'_>,
+    three::Packet<'_>,
+    &ucp::Frame
+);
+
+fn event<F: Bytes>(event: Event<F>) -> axle_stream_event {
+    match event {
+        Event::Frame(frame) => {
+            let bytes = frame.bytes();
+            axle_stream_event {
+                kind: AXLE_STREAM_FRAME,
+                reason: 0,
+                bytes: bytes.as_ptr(),
+                length: bytes.len(),
+                skipped: 0,
+            }
+        }
+        Event::Skipped(gap) => axle_stream_event {
+            kind: AXLE_STREAM_SKIPPED,
+            reason: match gap.reason {
+                Reason::Crc => AXLE_REASON_CRC,
+                Reason::Header => AXLE_REASON_HEADER,
+                Reason::Id => AXLE_REASON_ID,
+                Reason::Length => AXLE_REASON_LENGTH,
+                Reason::Idle => AXLE_REASON_IDLE,
+                _ => u8::MAX,
+            },
+            bytes: core::ptr::null(),
+            length: 0,
+            skipped: gap.len,
+        },
+    }
+}
+
+impl<F: Framing, const N: usize> Decode for axlewire::stream::Decoder<F, N>
+where
+    for<'a> F::Frame<'a>: Bytes,
+{
+    #[inline]
+    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event> {
+        self.decode(input).map(event)
+    }
+
+    fn push(&mut self, byte: u8) -> bool {
+        self.push(byte)
+    }
+
+    fn spare(&mut self) -> &mut [u8] {
+        self.spare()
+    }
+
+    fn commit(&mut self, len: usize) {
+        self.commit(len);
+    }
+
+    fn idle(&mut self) {
+        self.idle();
+    }
+
+    fn pending(&self) -> usize {
+        self.pending()
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters()
+    }
+}
+
+impl Decode for IkeyaDecoder {
+    #[inline]
+    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event> {
+        of_framing!(self, it => Decode::decode(it, input))
+    }
+
+    fn push(&mut self, byte: u8) -> bool {
+        of_framing!(self, it => it.push(byte))
+    }
+
+    fn spare(&mut self) -> &mut [u8] {
+        of_framing!(self, it => it.spare())
+    }
+
+    fn commit(&mut self, len: usize) {
+        of_framing!(self, it => it.commit(len));
+    }
+
+    fn idle(&mut self) {
+        of_framing!(self, it => it.idle());
+    }
+
+    fn pending(&self) -> usize {
+        of_framing!(self, it => it.pending())
+    }
+
+    fn counters(&self) -> Counters {
+        of_framing!(self, it => it.counters())
+    }
+}
+
+object! {
+    /// A decoder of a motor bus.
+    axle_ikeya_decoder, AXLE_IKEYA_DECODER_SIZE = 144, 18 words of IkeyaDecoder, b"axDi"
+}
+
+object! {
+    /// A decoder of the link of a rover.
+    axle_ucp_decoder, AXLE_UCP_DECODER_SIZE = 184, 23 words of ucp::Decoder, b"axDu"
+}
+
+/// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
+/// `sizeof *decoder`.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ikeya_decoder_init(
+    decoder: *mut axle_ikeya_decoder,
+    size: usize,
+    framing: u8,
+) -> axle_result {
+    init(decoder, size, || IkeyaDecoder::new(framing))
+}
+
+/// Makes an empty decoder. `size` is `sizeof *decoder`.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_decoder_init(decoder: *mut axle_ucp_decoder, size: usize) -> axle_result {
+    init(decoder, size, || Ok(ucp::Decoder::new()))
+}
+
+fn decode<M: Memory>(
+    decoder: *mut M,
+    data: *mut *const u8,
+    length: *mut usize,
+    event: *mut axle_stream_event,
+) -> axle_result
+where
+    M::Value: Decode,
+{
+    let next = || {
+        let (event, out_data, out_length) = (Out::new(event)?, Out::new(data)?, Out::new(length)?);
+        let (data, length) = (read(data)?, read(length)?);
+        let (next, rest) = enter_with(decoder, data, length, |decoder, bytes| {
+            let mut rest = bytes;
+            (decoder.decode(&mut rest), rest.len())
+        })?;
+        out_data.write(data.wrapping_add(length - rest));
+        out_length.write(rest);
+        Ok(next.map_or(AXLE_NONE, |next| event.write(next)))
+    };
+    next().unwrap_or_else(|error: axle_result| error)
+}
+
+fn poll<M: Memory>(decoder: *mut M, event: *mut axle_stream_event) -> axle_result
+where
+    M::Value: Decode,
+{
+    let next = || {
+        let event = Out::new(event)?;
+        let next = enter(decoder, |decoder| decoder.decode(&mut &[][..]))?;
+        Ok(next.map_or(AXLE_NONE, |next| event.write(next)))
+    };
+    next().unwrap_or_else(|error| error)
+}
+
+fn push<M: Memory>(decoder: *mut M, byte: u8) -> axle_result
+where
+    M::Value: Decode,
+{
+    match enter(decoder, |decoder| decoder.push(byte)) {
+        Ok(true) => AXLE_OK,
+        Ok(false) => AXLE_NONE,
+        Err(error) => error,
+    }
+}
+
+fn spare<M: Memory>(decoder: *mut M, bytes: *mut *mut u8, length: *mut usize) -> axle_result
+where
+    M::Value: Decode,
+{
+    let get = || {
+        let (bytes, length) = (Out::new(bytes)?, Out::new(length)?);
+        let (start, count) = enter(decoder, |decoder| {
+            let spare = decoder.spare();
+            (spare.as_mut_ptr(), spare.len())
+        })?;
+        bytes.write(start);
+        Ok(length.write(count))
+    };
+    get().unwrap_or_else(|error| error)
+}
+
+fn counters<M: Memory>(decoder: *const M, counters: *mut axle_counters) -> axle_result
+where
+    M::Value: Decode,
+{
+    let get = || {
+        let out = Out::new(counters)?;
+        Ok(out.write(enter(decoder, |decoder| decoder.counters())?.into()))
+    };
+    get().unwrap_or_else(|error| error)
+}
+
+fn pending<M: Memory>(decoder: *const M, count: *mut usize) -> axle_result
+where
+    M::Value: Decode,
+{
+    let get = || {
+        let out = Out::new(count)?;
+        Ok(out.write(enter(decoder, |decoder| decoder.pending())?))
+    };
+    get().unwrap_or_else(|error| error)
+}
+
+/// The functions of a decoder with these names.
+macro_rules! decoder {
+    ($decoder:ident: $decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident $counters:ident) => {
+        /// The next frame or gap in the bytes that are held and in `*data`; advances `*data` and
+        /// `*length` past the bytes used. `AXLE_NONE` once all are used up.
+        ///
+        /// Call it until it returns `AXLE_NONE`, or go on later with the rest.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $decode(
+            decoder: *mut $decoder,
+            data: *mut *const u8,
+            length: *mut usize,
+            event: *mut axle_stream_event,
+        ) -> axle_result {
+            decode(decoder, data, length, event)
+        }
+
+        /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
+        ///
+        /// Poll until `AXLE_NONE` before the next byte: a full decoder refuses bytes.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $push(decoder: *mut $decoder, byte: u8) -> axle_result {
+            push(decoder, byte)
+        }
+
+        /// The next frame or gap in the bytes that are held; `AXLE_NONE` if there is none.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $poll(
+            decoder: *mut $decoder,
+            event: *mut axle_stream_event,
+        ) -> axle_result {
+            poll(decoder, event)
+        }
+
+        /// Free space behind the bytes that are held, for a port or a DMA to write into; then
+        /// `commit` them. At least one byte once `poll` has returned `AXLE_NONE`.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $spare(
+            decoder: *mut $decoder,
+            bytes: *mut *mut u8,
+            length: *mut usize,
+        ) -> axle_result {
+            spare(decoder, bytes, length)
+        }
+
+        /// Takes in the first bytes of the spare space; more than its length count as that.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $commit(decoder: *mut $decoder, length: usize) -> axle_result {
+            of(enter(decoder, |decoder| decoder.commit(length)))
+        }
+
+        /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
+        /// B3). Then poll until `AXLE_NONE`.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $idle(decoder: *mut $decoder) -> axle_result {
+            of(enter(decoder, |decoder| decoder.idle()))
+        }
+
+        /// Number of bytes that are held and undecided.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $pending(decoder: *const $decoder, count: *mut usize) -> axle_result {
+            pending(decoder, count)
+        }
+
+        /// The account of all bytes so far.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $counters(
+            decoder: *const $decoder,
+            account: *mut axle_counters,
+        ) -> axle_result {
+            counters(decoder, account)
+        }
+    };
+}
+
+decoder!(axle_ikeya_decoder:
+    axle_ikeya_decoder_decode axle_ikeya_decoder_push axle_ikeya_decoder_poll
+    axle_ikeya_decoder_spare axle_ikeya_decoder_commit axle_ikeya_decoder_idle
+    axle_ikeya_decoder_get_pending axle_ikeya_decoder_get_counters);
+decoder!(axle_ucp_decoder:
+    axle_ucp_decoder_decode axle_ucp_decoder_push axle_ucp_decoder_poll
+    axle_ucp_decoder_spare axle_ucp_decoder_commit axle_ucp_decoder_idle
+    axle_ucp_decoder_get_pending axle_ucp_decoder_get_counters);
