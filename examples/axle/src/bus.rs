@@ -173,26 +173,30 @@ impl<B: Boards> Bus<B> {
         Ok(())
     }
 
-    /// Begins anew with half a second for answers, if an id gives only answers that are too late;
-    /// from then on with the ids that may have answered.
-    ///
-    /// The line is left alone before: an old answer must not count as a new one.
-    pub(crate) fn wait_longer(&mut self) -> bool {
+    /// Whether an id has given only answers that are too late, and could be waited for longer.
+    pub(crate) fn could_wait_longer(&self) -> bool {
         let config = self.master().config();
         let is_late = |node| self.status(node).is_none() && self.late(node) > 0;
-        if config.reply_timeout >= SLOW_TIMEOUT || !config.nodes.iter().any(is_late) {
-            return false;
-        }
-        // A part of a late answer is a damaged one of another id, which is asked in vain.
-        let is_there = |node: &NodeId| {
-            self.status(*node).is_some() || self.is_untimely(*node) || self.is_damaged(*node)
-        };
-        let nodes = config.nodes.iter().filter(is_there).collect();
-        self.begin_patiently(nodes, 2);
-        true
+        config.reply_timeout < SLOW_TIMEOUT && config.nodes.iter().any(is_late)
+    }
+
+    /// Ids that have answered, in time or not.
+    pub(crate) fn those_heard(&self) -> NodeSet {
+        let nodes = self.master().config().nodes.iter();
+        nodes.filter(|&node| self.status(node).is_some() || self.is_untimely(node)).collect()
+    }
+
+    /// Ids that may have answered, also with damaged bytes: part of a late answer may count as a
+    /// damaged one of another id. On a slow line, others may be there all the same.
+    pub(crate) fn may_be_there(&self) -> NodeSet {
+        let heard = self.those_heard();
+        let is_there = |node: &NodeId| heard.contains(*node) || self.is_damaged(*node);
+        self.master().config().nodes.iter().filter(is_there).collect()
     }
 
     /// Begins anew with half a second for answers, for these nodes, each read this often at most.
+    ///
+    /// The line is left alone before: an old answer must not count as a new one.
     pub(crate) fn begin_patiently(&mut self, nodes: NodeSet, attempts: u8) {
         let mut config = *self.master().config();
         (config.nodes, config.attempts) = (nodes, config.attempts.min(attempts));

@@ -105,7 +105,12 @@ fn first_time(path: &Path, form: Form) -> Result<u64, Failure> {
     }
     // Damage is told when the file is read.
     let mut reader = Reader::new(&mut input);
-    Ok(reader.next().ok().flatten().and_then(|packet| packet.micros).unwrap_or(u64::MAX))
+    while let Ok(Some(packet)) = reader.next() {
+        if let Some(micros) = packet.micros {
+            return Ok(micros);
+        }
+    }
+    Ok(u64::MAX)
 }
 
 /// The names for a message.

@@ -44,13 +44,21 @@ impl<R: BufRead> Read for Hex<R> {
             // No more than its digits give bytes.
             let len = text.len().min(buffer.len());
             let text: Vec<u8> = text.iter().copied().take(len).collect();
+            let mut used = 0;
             for &character in &text {
-                if let Some(byte) = self.take(character).map_err(|why| self.odd(why))? {
-                    buffer.iter_mut().skip(count).take(1).for_each(|slot| *slot = byte);
-                    count += 1;
+                match self.take(character) {
+                    Ok(Some(byte)) => {
+                        buffer.iter_mut().skip(count).take(1).for_each(|slot| *slot = byte);
+                        count += 1;
+                    }
+                    Ok(None) => {}
+                    // The next call comes to it again.
+                    Err(_) if count > 0 => break,
+                    Err(why) => return Err(self.odd(why)),
                 }
+                used += 1;
             }
-            self.text.consume(len);
+            self.text.consume(used);
             if count > 0 || len == 0 {
                 return Ok(count);
             }
@@ -104,5 +112,13 @@ mod tests {
         assert_eq!(read("fd\nf"), Err(half.to_owned()));
         let other = "line 3 is not hex text: there is something else than hexadecimal digits";
         assert_eq!(read("fd\n\nrx: ff"), Err(other.to_owned()));
+    }
+
+    #[test]
+    fn what_is_in_front_of_other_text_is_read() {
+        let mut hex = Hex::new(&b"fd ff # end"[..]);
+        let mut buffer = [0; 16];
+        assert_eq!((hex.read(&mut buffer).unwrap(), buffer[..2].to_vec()), (2, vec![0xFD, 0xFF]));
+        assert_eq!(hex.read(&mut buffer).unwrap_err().kind(), ErrorKind::InvalidData);
     }
 }

@@ -17,6 +17,18 @@ use crate::{
     pcapng,
 };
 
+/// How files begin that are no captures which this tool reads, and what they are.
+const FOREIGN: &[(&[u8], &str)] = &[
+    (&GZIP, "packed twice"),
+    (&[0x28, 0xB5, 0x2F, 0xFD], "packed by zstd"),
+    (&[0x04, 0x22, 0x4D, 0x18], "packed by lz4"),
+    (&[0xFD, b'7', b'z', b'X', b'Z', 0], "packed by xz"),
+    (b"BZh", "packed by bzip2"),
+    (b"PK\x03\x04", "a zip file"),
+    (&[0x34, 0xCD, 0xB2, 0xA1], "a modified pcap file"),
+    (&[0xA1, 0xB2, 0xCD, 0x34], "a modified pcap file"),
+];
+
 /// Maximum number of bytes read at once.
 pub(crate) const CHUNK_LEN: usize = 64 * 1024;
 
@@ -222,6 +234,10 @@ impl Input {
         let front = self.peek(SAMPLE_LEN, |front| !hex::is_hex(front))?;
         if front.len() >= SAMPLE_LEN && hex::is_hex(front) {
             return Err(Failure::Usage("the capture is hex text: use --hex".to_owned()));
+        }
+        if let Some((_, kind)) = FOREIGN.iter().find(|(magic, _)| front.starts_with(magic)) {
+            let line = format!("the capture is {kind}: unpack or convert it first");
+            return Err(Failure::Failed(line));
         }
         if is_telnet(front) {
             eprintln!(

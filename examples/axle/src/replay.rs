@@ -2,7 +2,7 @@
 
 mod pace;
 
-use std::path::PathBuf;
+use std::{collections::VecDeque, path::PathBuf};
 
 use crate::{
     args::{self, Protocol},
@@ -34,9 +34,10 @@ use pace::Pace;
 /// robot that is no longer heard end the replay. At the end, on every error and on every signal
 /// that can be caught, what was commanded is stopped.
 ///
-/// A capture of several lines is refused, and so is one in which a commanded node changes its mode.
-/// Firmware updates, motor commands out of range, bodies of a wrong length and frames hidden in
-/// others, also in those of a device, are refused (rulings I3, U7 and U13).
+/// Of a capture with several lines, --interface chooses one. A capture in which a commanded node
+/// changes its mode is refused. Firmware updates, motor commands out of range, bodies of a wrong
+/// length and frames hidden in others, also in those of a device, are refused (rulings I3, U7 and
+/// U13).
 ///
 /// The capture is held in memory: 4 to 40 times its size, most for the short packets of a bus.
 #[derive(Debug, clap::Args)]
@@ -62,6 +63,10 @@ pub(crate) struct Args {
     /// and that is said
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = args::seconds)]
     longest_pause: u64,
+
+    /// The line to send, if a capture has several: its number from 0, as decode shows it
+    #[arg(long, value_name = "N")]
+    interface: Option<usize>,
 
     /// Interval between two frames of raw bytes, seconds
     #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = args::seconds)]
@@ -126,10 +131,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 /// The frames of one side of the capture, each with its time.
 fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
-    let (protocol, taken, walked) = decode::frames_of(&args.files, args.form, args.protocol)?;
+    let (protocol, mut taken, walked) =
+        decode::frames_of(&args.files, args.form, args.protocol, args.interface)?;
+    if walked.times_back == 0 {
+        // A frame behind a false start comes late, and files of one line may overlap.
+        taken = in_order_of_time(taken);
+    }
     let mut frames = Vec::new();
     let mut pace = Pace::new(args.speed, args.longest_pause);
-    let (mut has_sent, mut summary) = (false, Summary::default());
+    let (mut echoes, mut summary) = (Echoes::default(), Summary::default());
     summary.skipped_bytes = walked.account.skipped();
     for Taken { micros, direction, bytes, commands } in taken {
         let due_us = micros.map(|micros| pace.due_us(micros));
@@ -148,7 +158,11 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
             summary.other_side += 1;
             continue;
         }
-        let last_us = frames.last().map(|(_, due): &(_, Due)| due.after_us);
+        if echoes.has(direction, micros, &bytes) {
+            summary.echoes += 1;
+            continue;
+        }
+        let last_us = frames.last().map(|due: &Due| due.after_us);
         let unknown_us = last_us.map_or(0, |last_us| last_us + args.every);
         let after_us = due_us.unwrap_or(unknown_us).max(last_us.unwrap_or(0));
         if after_us > LONGEST_US {
@@ -157,21 +171,16 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         }
         // The answers in the capture say how its commands were meant.
         let meant = commands.and_then(|node| walked.modes.of(node));
-        has_sent |= direction == Some(Direction::Out);
-        frames.push((direction, Due { after_us, bytes, meant, effect }));
+        frames.push(Due { after_us, bytes, meant, effect });
     }
-    // Bytes that the recording program sent and then received are its own echo.
-    let all = frames.len();
-    frames.retain(|(direction, _)| !has_sent || *direction == Some(Direction::Out));
-    summary.echoes = all - frames.len();
     // It begins with the first of them.
-    let begin_us = frames.first().map_or(0, |(_, due)| due.after_us);
-    frames.iter_mut().for_each(|(_, due)| due.after_us -= begin_us);
+    let begin_us = frames.first().map_or(0, |due| due.after_us);
+    frames.iter_mut().for_each(|due| due.after_us -= begin_us);
     if frames.is_empty() {
         let line = format!("no frame of a {} in the capture", args.side);
         return Err(Failure::Failed(line));
     }
-    let moving = frames.iter().filter(|(_, due)| due.effect.moves()).count();
+    let moving = frames.iter().filter(|due| due.effect.moves()).count();
     if moving > 0 && !args.moves && !args.dry_run {
         return Err(Failure::Failed(format!(
             "{moving} of {} frames move something: use --move if you mean it; nothing is sent",
@@ -182,7 +191,7 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         bus: &args.bus,
         protocol,
         side: args.side,
-        frames: frames.into_iter().map(|(_, due)| due).collect(),
+        frames: frames.into(),
         reads_back: false,
         linger_us: LINGER_US,
         limits: args.limits,
@@ -192,6 +201,44 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         summary: Some(summary),
     };
     Ok((plan, walked))
+}
+
+/// Frames without a time stay behind the one before them.
+fn in_order_of_time(taken: Vec<Taken>) -> Vec<Taken> {
+    let mut last = 0;
+    let timed = taken.into_iter().map(|taken| {
+        last = taken.micros.unwrap_or(last);
+        (last, taken)
+    });
+    let mut timed: Vec<_> = timed.collect();
+    timed.sort_by_key(|(micros, _)| *micros);
+    timed.into_iter().map(|(_, taken)| taken).collect()
+}
+
+/// Bytes that the recording program has sent, and may have received as its own echo.
+#[derive(Default)]
+struct Echoes(VecDeque<(Option<u64>, Box<[u8]>)>);
+
+impl Echoes {
+    /// Longest time from a frame to its echo, microseconds.
+    const LATEST_US: u64 = 1_000_000;
+
+    /// Whether this is the echo of a frame before it, which is then over.
+    fn has(&mut self, direction: Option<Direction>, micros: Option<u64>, bytes: &[u8]) -> bool {
+        let is_over = |sent: Option<u64>| {
+            let apart = micros.zip(sent).map(|(now, sent)| now.abs_diff(sent));
+            apart.is_some_and(|apart| apart > Self::LATEST_US)
+        };
+        while self.0.front().is_some_and(|(sent, _)| is_over(*sent)) {
+            self.0.pop_front();
+        }
+        if direction == Some(Direction::Out) {
+            self.0.push_back((micros, bytes.into()));
+            return false;
+        }
+        let place = self.0.iter().position(|(_, sent)| **sent == *bytes);
+        place.is_some_and(|place| self.0.remove(place).is_some())
+    }
 }
 
 #[cfg(test)]

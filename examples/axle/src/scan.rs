@@ -8,6 +8,7 @@ use anstyle::{AnsiColor, Effects, Style};
 use axlewire::ikeya::{
     Mode, NodeId,
     board::{OneMotor, ThreeMotors},
+    master::NodeSet,
     slave::{DipSwitch, IdReading},
 };
 use serde::Serialize;
@@ -111,7 +112,8 @@ fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
         bus.listen(&signals)?;
     }
     let (mut needs, mut times) = (None, Vec::new());
-    if args.bus.may_wait_longer() && bus.wait_longer() {
+    if args.bus.may_wait_longer() && bus.could_wait_longer() {
+        bus.begin_patiently(NodeSet::ALL, 2);
         discover(&mut bus, &signals)?;
         needs = bus.needed_patience();
     }

@@ -32,7 +32,8 @@ use crate::{
 /// without reports may be moving, and is a failure.
 ///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
-/// within about 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.
+/// within about 10 seconds, and within 40 on a line on which answers come late; Ctrl-C, Ctrl-Z and
+/// Ctrl-\ do not cut it short.
 ///
 /// What is sent on the wire: with --protocol ikeya or ikeya-3, READ packets for ids 1 to 8, or for
 /// --node only, and WRITE packets for those that answer; with --protocol ucp, zero motor commands
@@ -166,9 +167,13 @@ fn stop_whatever(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
 }
 
 /// Outcome for a bus.
+#[derive(Default)]
 struct Stopped {
     path: String,
+    /// Number of nodes that have answered.
     answered: usize,
+    /// Ids that have not, if all ids were to be stopped.
+    silent: Vec<NodeId>,
     /// Number of ids that gave only damaged answers.
     damaged: usize,
     /// One message for each node that is not known to be at rest.
@@ -178,6 +183,26 @@ struct Stopped {
 }
 
 impl Stopped {
+    /// Tells what has become of these nodes, some of which are known to have answered before.
+    fn judge_each<B: Boards>(&mut self, args: &Args, bus: &Bus<B>, nodes: NodeSet, known: NodeSet) {
+        for node in nodes.iter() {
+            self.answered += usize::from(bus.status(node).is_some());
+            self.damaged += usize::from(bus.is_damaged(node));
+            match bus.halt(node) {
+                Halt::Still => {
+                    let status = bus.status(node).map(B::data);
+                    let text = status.map(|it| it.to_string()).unwrap_or_default();
+                    tell(args, &Event::Stopped { node: Some(node), status, text });
+                }
+                Halt::Silent if known.contains(node) => self.complaints.push(format!(
+                    "node {node} has answered too late, and then no more: its motor may be moving"
+                )),
+                Halt::Silent if args.node.is_none() => self.silent.push(node),
+                _ => self.complaints.extend(bus.complaint(node)),
+            }
+        }
+    }
+
     /// `Ok` if something has answered and all of it is at rest.
     fn judge(self) -> Result<(), Failure> {
         let complaint = match (self.complaints.is_empty(), self.answered) {
@@ -204,36 +229,30 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
-    let mut failure = bus.stop(nodes).err();
-    if args.bus.may_wait_longer() && bus.wait_longer() {
-        failure = bus.stop(bus.master().config().nodes).err();
-        if let Some(patience) = bus.needed_patience() {
+    let failure = bus.stop(nodes).err();
+    let mut stopped = Stopped { path: bus.path().to_owned(), failure, ..Stopped::default() };
+    if args.bus.may_wait_longer() && bus.could_wait_longer() {
+        stopped.failure = None;
+        let (known, first) = (bus.those_heard(), bus.may_be_there());
+        let rest = nodes.iter().filter(|node| !first.contains(*node)).collect();
+        let mut needs = None;
+        // First those whose motors are known to be there.
+        for nodes in [first, rest] {
+            bus.begin_patiently(nodes, if nodes == first { 3 } else { 2 });
+            stopped.failure = bus.stop(nodes).err().or(stopped.failure);
+            stopped.judge_each(args, &bus, nodes, known);
+            needs = needs.max(bus.needed_patience());
+        }
+        if let Some(patience) = needs {
             eprintln!(
                 "axle: answers come late: others need --reply-timeout {patience} on this line"
             );
         }
+    } else {
+        stopped.judge_each(args, &bus, nodes, NodeSet::NONE);
     }
-    let mut silent = Vec::new();
-    let mut stopped = Stopped {
-        path: bus.path().to_owned(),
-        answered: bus.nodes().count(),
-        damaged: nodes.iter().filter(|&node| bus.is_damaged(node)).count(),
-        complaints: Vec::new(),
-        failure,
-    };
-    for node in nodes.iter() {
-        match bus.halt(node) {
-            Halt::Still => {
-                let status = bus.status(node).map(B::data);
-                let text = status.map(|it| it.to_string()).unwrap_or_default();
-                tell(args, &Event::Stopped { node: Some(node), status, text });
-            }
-            Halt::Silent if args.node.is_none() => silent.push(node),
-            _ => stopped.complaints.extend(bus.complaint(node)),
-        }
-    }
-    if stopped.answered > 0 && !silent.is_empty() {
-        tell(args, &Event::Silent { nodes: silent });
+    if stopped.answered > 0 && !stopped.silent.is_empty() {
+        tell(args, &Event::Silent { nodes: stopped.silent.clone() });
     }
     Ok(stopped)
 }

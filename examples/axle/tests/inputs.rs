@@ -322,3 +322,82 @@ fn a_bad_file_among_several_is_named_and_costs_nothing_of_the_others() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(error.contains("has no files that end in .pcapng"), "{error}");
 }
+
+/// A folder of captures, each with these interfaces and one WRITE on each.
+fn folder_of(name: &str, captures: &[(&str, &[&str])]) -> String {
+    let (folder, path) = set(name);
+    fs::remove_dir_all(&folder).unwrap();
+    for (number, (name, interfaces)) in captures.iter().enumerate() {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let mut file = PcapNg(PcapNg::new(147, &[]).0[..28].to_vec());
+        interfaces.iter().for_each(|port| file.named(147, port));
+        for (at, _) in interfaces.iter().enumerate() {
+            let write = WriteRequest::position(NodeId::N1, Position::new(1, at as i16));
+            let micros = (number as u64 + 1) * 1_000_000 + at as u64;
+            file.packet(at as u32, (micros, 2, write.as_bytes()));
+        }
+        fs::write(path, file.0).unwrap();
+    }
+    path
+}
+
+#[test]
+fn a_line_is_its_folder_and_its_port_however_both_are_written() {
+    let (one, other) = (["/dev/serial/x"], ["/dev/x"]);
+    let apart = folder_of("apart", &[("a.pcapng", &one), ("serial/b.pcapng", &other)]);
+    let output = axle(&["replay", "--dry-run", &apart]).output().unwrap();
+    assert!(String::from_utf8(output.stderr).unwrap().contains("has more than one line"));
+    // The order of the interfaces is of no matter.
+    let (one, other) = (["ttyS4", "ttyS5"], ["ttyS5", "ttyS4"]);
+    let turned = folder_of("turned", &[("a.pcapng", &one), ("b.pcapng", &other)]);
+    let (rows, ..) = outcome(axle(&["decode", "--json", &turned]).output().unwrap());
+    let interfaces = rows
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).unwrap()["interface"].as_u64());
+    assert_eq!(interfaces.collect::<Vec<_>>(), [0, 1, 1, 0]);
+}
+
+#[test]
+fn one_line_of_several_can_be_chosen() {
+    let folder = folder_of("chosen", &[("a.pcapng", &["ttyS4", "ttyS5"])]);
+    for command in [&["replay", "--dry-run", "--json"][..], &["watch", "--json"]] {
+        let (_, code, error) = outcome(axle(&[command, &[&folder]].concat()).output().unwrap());
+        assert!(code == Some(1) && error.contains("choose one with --interface"), "{error}");
+        let chosen = [command, &["--interface", "1", &folder]].concat();
+        let (listing, code, error) = outcome(axle(&chosen).output().unwrap());
+        assert!(code == Some(0) && error.is_empty(), "{error}");
+        assert!(command[0] == "watch" || listing.contains("\"count\":1"), "{listing}");
+    }
+}
+
+#[test]
+fn times_before_1970_are_impossible_ones() {
+    let mut file = PcapNg(PcapNg::new(147, &[]).0[..28].to_vec());
+    let offset = (-2_i64).to_le_bytes();
+    let body = [&[147, 0, 0, 0, 0, 0, 0, 0, 14, 0, 8, 0][..], &offset, &[0; 4]].concat();
+    file.block(1, &body);
+    let read = *ReadRequest::new(NodeId::N1).as_bytes();
+    for micros in [0, 500_000, 3_000_000] {
+        file.packet(0, (micros, 2, &read));
+    }
+    let (rows, code, error) = outcome(run(&["decode", "--json"], &file.0));
+    assert_eq!(code, Some(0));
+    assert!(error.contains("2 packets have an impossible time"), "{error}");
+    let times = rows.lines().map(|row| serde_json::from_str::<Value>(row).unwrap()["t"].as_f64());
+    assert_eq!(times.take(3).collect::<Vec<_>>(), [None, None, Some(1.0)]);
+}
+
+#[test]
+fn what_is_packed_by_others_is_named() {
+    let read = *ReadRequest::new(NodeId::N1).as_bytes();
+    for (begin, says) in [
+        (&[0x28, 0xB5, 0x2F, 0xFD][..], "packed by zstd"),
+        (&[0x34, 0xCD, 0xB2, 0xA1], "a modified pcap file"),
+        (&packed(&packed(&read)), "packed twice"),
+    ] {
+        let file = if says == "packed twice" { begin.to_vec() } else { [begin, &read].concat() };
+        let (_, code, error) = outcome(run(&["decode"], &file));
+        assert!(code == Some(1) && error.contains(says), "{says}: {error}");
+    }
+}

@@ -37,7 +37,10 @@ fn the_lines_of_a_capture_are_not_sent_to_one_port() {
     let mut capture = PcapNg::new(IKEYA, &[(0, 0, &place), (1, 0, &write)]);
     capture.interface(IKEYA);
     capture.packet(1, (2, 0, &speed));
-    assert_eq!(refusal("lines.pcapng", &capture.0), "CAPTURE has more than one line");
+    assert_eq!(
+        refusal("lines.pcapng", &capture.0),
+        "CAPTURE has more than one line: choose one with --interface"
+    );
 }
 
 #[test]

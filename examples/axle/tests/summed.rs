@@ -79,7 +79,7 @@ fn lines_of_several_protocols_are_told_apart() {
     capture.packet(1, (1, 0, &answer));
     let (table, code, error) = outcome(run(&["watch", "-"], &capture.0));
     assert!(table.contains("ping") && !table.contains("skipped:"), "{table}");
-    let says = "axle: the capture has lines of several protocols: axle decode lists them all\n";
+    let says = "axle: the capture has more than one line: choose one with --interface\n";
     assert_eq!((code, &*error), (Some(1), says));
 }
 
@@ -93,7 +93,7 @@ fn the_nodes_of_each_line_have_modes_of_their_own() {
     capture.interface(IKEYA);
     capture.packet(1, (1, 0, &place));
     capture.packet(0, (2, 0, &write));
-    let found = summary(&[], &capture.0);
+    let found = summary(&["--interface", "0"], &capture.0);
     let messages = found["messages"].as_array().unwrap();
     let write = messages.iter().find(|of| of["message"] == "write").unwrap();
     assert_eq!(write["last"], "1.0 rps");

@@ -294,7 +294,10 @@ pub extern "C" fn axle_ikeya_decoder_init(
 
 /// Makes an empty decoder. `size` is `sizeof *decoder`.
 #[unsafe(no_mangle)]
-pub extern "C" fn axle_ucp_decoder_init(decoder: *mut axle_ucp_decoder, size: usize) -> axle_result {
+pub extern "C" fn axle_ucp_decoder_init(
+    decoder: *mut axle_ucp_decoder,
+    size: usize,
+) -> axle_result {
     init(decoder, size, || Ok(ucp::Decoder::new()))
 }
 

@@ -7,7 +7,7 @@ use axlewire::{ikeya::master::MasterConfig, time::Duration};
 use crate::args;
 
 /// The value of `--reply-timeout`.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
 pub(crate) enum Patience {
     /// As the protocol specifies, for a UART built into this machine.
     Direct,

@@ -37,6 +37,11 @@ pub(crate) struct Choice {
     pub(crate) protocol: Option<Protocol>,
     /// Ikeya: packets of one direction only.
     pub(crate) direction: Option<Direction>,
+    /// Of a capture with interfaces: packets of this one only.
+    pub(crate) interface: Option<usize>,
+    /// The interfaces of one port in several sections of a file are one, with the number of the
+    /// first.
+    pub(crate) joins_sections: bool,
 }
 
 impl Choice {

@@ -44,7 +44,8 @@ const MOST_JOBS: usize = 16;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let choice = Choice { protocol: args.protocol.0, direction: args.direction };
+    let choice =
+        Choice { protocol: args.protocol.0, direction: args.direction, ..Choice::default() };
     if let Some(protocol) = choice.protocol {
         choice.permits(protocol)?;
     }
@@ -80,17 +81,18 @@ pub(crate) fn frames_of(
     paths: &[PathBuf],
     form: Form,
     chosen: Option<Protocol>,
+    interface: Option<usize>,
 ) -> Result<(Protocol, Vec<Taken>, Walked), Failure> {
     let mut input = captures::open(paths, form)?;
     let mut sheet = Sheet::new(None);
     sheet.taken = Some(Default::default());
-    let choice = Choice { protocol: chosen, direction: None };
+    let choice = Choice { protocol: chosen, interface, joins_sections: true, ..Choice::default() };
     let mut found = None;
     let mut walked = walk(&mut input, choice, &mut sheet, |next, _| {
         let line = (next.protocol, next.interface);
         if *found.get_or_insert(line) != line {
             return Err(Failure::Failed(format!(
-                "{} has more than one line",
+                "{} has more than one line: choose one with --interface",
                 captures::named(paths)
             )));
         }

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet, btree_map::Entry},
-    path::Path,
+    path::{Path, PathBuf},
     rc::Rc,
 };
 
@@ -110,8 +110,8 @@ pub(crate) fn walk(
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
     let (lines, mut walked) = (BTreeMap::new(), Walked::default());
-    let ports = input.is_of_a_collection().then(Vec::new);
-    walked.is_collection = ports.is_some();
+    walked.is_collection = input.is_of_a_collection();
+    let ports = (walked.is_collection || choice.joins_sections).then(BTreeMap::new);
     input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let foreign = BTreeSet::new();
     let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, foreign, go_on };
@@ -135,9 +135,9 @@ struct Walk<G> {
     /// Packets so far, and the time of the last one.
     number: u64,
     latest: u64,
-    /// In a collection: what each interface is. The numbers of the files do not tell the lines
-    /// apart.
-    ports: Option<Vec<Port>>,
+    /// In a collection, or if sections are joined: what each interface is. The numbers of the
+    /// files do not tell the lines apart.
+    ports: Option<BTreeMap<usize, Port>>,
     /// Those of them that are no lines of a known protocol.
     foreign: BTreeSet<usize>,
     go_on: G,
@@ -146,13 +146,17 @@ struct Walk<G> {
 /// An interface of a collection. Two of one name in a file are two lines, and so are those of files
 /// in different folders.
 struct Port {
-    /// As its files describe it: folder and name, link type, and number in its section.
-    described: (String, u16, usize),
+    /// As its files describe it.
+    described: Described,
     /// What tells it apart from the others.
     name: Rc<str>,
     /// The modes of its nodes at the end of a file: the next one goes on with them.
     modes: Modes,
 }
+
+/// Folder and name, link type, and the number among those of one name; of those without a name,
+/// the number in the section.
+type Described = (PathBuf, Option<String>, u16, usize);
 
 /// What an interface was connected to.
 struct Line {
@@ -178,7 +182,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
     fn packets_of_one(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<bool, Failure> {
         let (path, folder) = (input.path().map(ToOwned::to_owned), input.folder());
         let mut reader = Reader::new(input);
-        let (mut section, mut last) = (0, None);
+        let (mut section, mut last, is_collection) = (0, None, self.walked.is_collection);
         // By the number in the file: it is looked up once, not for each packet.
         let mut numbers = BTreeMap::new();
         // Lines are recorded at the same time.
@@ -204,11 +208,15 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 self.end_lines(sheet);
             }
             let interface = match &mut self.ports {
-                Some(ports) => *numbers
-                    .entry(packet.interface)
-                    .or_insert_with(|| number_of(ports, &folder, &packet)),
+                Some(ports) => *numbers.entry(packet.interface).or_insert_with(|| {
+                    let new = if is_collection { ports.len() } else { packet.interface };
+                    number_of(ports, new, &folder, &packet)
+                }),
                 None => packet.interface,
             };
+            if self.choice.interface.is_some_and(|wanted| wanted != interface) {
+                continue;
+            }
             let line = match self.lines.entry(interface) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
@@ -216,7 +224,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         Some(protocol) => protocol,
                         None => match protocol_of(&packet) {
                             Ok(protocol) => protocol,
-                            Err(failure) if self.ports.is_some() => {
+                            Err(failure) if is_collection => {
                                 // Told once.
                                 if self.foreign.insert(interface) {
                                     let path = path.as_deref().unwrap_or(Path::new(""));
@@ -228,7 +236,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         },
                     };
                     self.choice.permits(protocol)?;
-                    let port = self.ports.as_ref().and_then(|ports| ports.get(interface));
+                    let port = self.ports.as_ref().and_then(|ports| ports.get(&interface));
                     new.insert(Line::new(protocol, Some(interface), port))
                 }
             };
@@ -290,7 +298,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
         for (interface, mut line) in core::mem::take(&mut self.lines) {
             walked.account += line.finish(sheet);
             walked.modes = line.modes;
-            if let Some(port) = self.ports.as_mut().and_then(|ports| ports.get_mut(interface)) {
+            if let Some(port) = self.ports.as_mut().and_then(|ports| ports.get_mut(&interface)) {
                 port.modes = line.modes;
             }
         }
@@ -336,26 +344,36 @@ impl Line {
     }
 }
 
-/// The number of its port.
-fn number_of(ports: &mut Vec<Port>, folder: &Path, packet: &Packet<'_>) -> usize {
+/// The number of its port; this one, if the port is new.
+fn number_of(
+    ports: &mut BTreeMap<usize, Port>,
+    new: usize,
+    folder: &Path,
+    packet: &Packet<'_>,
+) -> usize {
     let Packet { described, number, .. } = packet;
-    let port = match &described.name {
-        // Readers of exports would take it for a number, and 007 for 7.
-        Some(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => format!("port {name}"),
-        Some(name) => name.strip_prefix("/dev/").unwrap_or(name).to_owned(),
-        None => format!("interface {number}"),
-    };
-    let parts = folder.iter().map(|part| part.to_string_lossy().into_owned());
-    let port = parts.chain([port]).collect::<Vec<_>>().join("/");
-    let port = (port, described.link_type, *number);
-    ports.iter().position(|known| known.described == port).unwrap_or_else(|| {
-        let is_like = |other: &Port| other.described.0 == port.0 && other.described.2 != port.2;
-        let name = match ports.iter().any(is_like) {
-            true => format!("{} (interface {number})", port.0),
-            false => port.0.clone(),
+    let apart = if described.name.is_some() { described.twin } else { *number };
+    let key = (folder.to_owned(), described.name.clone(), described.link_type, apart);
+    let known = ports.iter().find(|(_, port)| port.described == key);
+    known.map(|(number, _)| *number).unwrap_or_else(|| {
+        let port = match &described.name {
+            // Readers of exports would take it for a number, and 007 for 7.
+            Some(name) if name.bytes().all(|byte| byte.is_ascii_digit()) => format!("port {name}"),
+            Some(name) => name.strip_prefix("/dev/").unwrap_or(name).to_owned(),
+            None => format!("interface {number}"),
         };
-        ports.push(Port { described: port, name: name.into(), modes: Modes::default() });
-        ports.len() - 1
+        let parts = folder.iter().map(|part| part.to_string_lossy().into_owned());
+        let mut name = parts.chain([port]).collect::<Vec<_>>().join("/");
+        if described.name.is_some() && described.twin > 0 {
+            name.push_str(&format!(" (interface {number})"));
+        }
+        // What is written alike may be different all the same.
+        let is_taken = |name: &str| ports.values().any(|known| *known.name == *name);
+        if is_taken(&name) {
+            name.push_str(&format!(" (line {})", ports.len() + 1));
+        }
+        ports.insert(new, Port { described: key, name: name.into(), modes: Modes::default() });
+        new
     })
 }
 

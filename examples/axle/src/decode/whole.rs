@@ -26,7 +26,7 @@ pub(crate) struct Chosen {
 /// Finds out what `input` is, as `axle decode` does: pcapng tells its protocols, and raw bytes are
 /// of the named one, or of the one that they look like.
 pub(crate) fn choose(input: &mut Input, named: Option<Protocol>) -> Result<Chosen, Failure> {
-    let mut choice = Choice { protocol: named, direction: None };
+    let mut choice = Choice { protocol: named, ..Choice::default() };
     let has_times = input.has_times()?;
     let mut found = None;
     if !has_times && named.is_none() {

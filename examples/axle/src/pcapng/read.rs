@@ -32,6 +32,8 @@ pub(crate) struct Interface {
     pub(crate) link_type: u16,
     /// As text, however it was written; the beginning of a very long one.
     pub(crate) name: Option<String>,
+    /// Number of interfaces before it in the section that have its name and link type.
+    pub(crate) twin: usize,
     /// Packets are cut at this length; 0 is none.
     longest_packet: u32,
     unit: Unit,
@@ -207,9 +209,13 @@ impl<R: Read> Reader<R> {
                     if self.interfaces.len() == MOST_INTERFACES {
                         return Err(invalid("its section has more than 1024 interfaces"));
                     }
-                    let Some(interface) = self.interface(body) else {
+                    let Some(mut interface) = self.interface(body) else {
                         return Err(invalid("it is too short for an interface"));
                     };
+                    let is_twin = |it: &&Interface| {
+                        (it.link_type, &it.name) == (interface.link_type, &interface.name)
+                    };
+                    interface.twin = self.interfaces.iter().filter(is_twin).count();
                     self.interfaces.push(interface);
                 }
                 block::PACKET | block::OBSOLETE_PACKET | block::SIMPLE_PACKET
@@ -244,7 +250,8 @@ impl<R: Read> Reader<R> {
         let (longest_packet, link_type) = (self.peek(16).unwrap_or(0), self.peek(20).unwrap_or(0));
         let (name, unit) = (None, Unit(classic.unit));
         let link_type = link_type as u16;
-        self.interfaces.push(Interface { link_type, name, longest_packet, unit, offset_s: 0 });
+        let interface = Interface { link_type, name, twin: 0, longest_packet, unit, offset_s: 0 };
+        self.interfaces.push(interface);
         self.section = 1;
         self.skip(24);
         Ok(())
@@ -331,8 +338,14 @@ impl<R: Read> Reader<R> {
         let body = self.buffer.get(body)?;
         let (link_type, options) = (self.u16(body.get(..2)?)?, body.get(8..)?);
         let longest_packet = self.u32(body.get(4..8)?)?;
-        let mut interface =
-            Interface { link_type, name: None, longest_packet, unit: Unit(6), offset_s: 0 };
+        let mut interface = Interface {
+            link_type,
+            name: None,
+            twin: 0,
+            longest_packet,
+            unit: Unit(6),
+            offset_s: 0,
+        };
         for (code, value) in self.options(options) {
             match (code, value) {
                 (option::INTERFACE_NAME, name) => {
@@ -386,7 +399,9 @@ impl<R: Read> Reader<R> {
         if has_time {
             let time = u64::from(word(4)?) << 32 | u64::from(word(8)?);
             let offset_us = described.offset_s.saturating_mul(1_000_000);
-            found.micros = Some(described.unit.micros(time).saturating_add_signed(offset_us));
+            // Before 1970 is a time that no clock can have shown, as is the far future.
+            let micros = described.unit.micros(time).checked_add_signed(offset_us);
+            found.micros = Some(micros.unwrap_or(u64::MAX));
             let options = body.get(begin + len.next_multiple_of(4)..).unwrap_or_default();
             let flags = self.options(options).find(|(code, _)| *code == option::FLAGS);
             let flags = flags.and_then(|(_, flags)| self.u32(flags));

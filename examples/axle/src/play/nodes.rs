@@ -13,7 +13,7 @@ use axlewire::{
 use super::{
     effect::Effect,
     plan::{Due, Plan},
-    playing::Voice,
+    playing::{Given, Voice},
 };
 use crate::{
     bus::{self, Boards, Bus},
@@ -38,6 +38,8 @@ pub(super) struct Nodes<B: Boards> {
     targets: VecDeque<Target<B>>,
     /// The latest command of each node.
     given: Vec<(NodeId, Target<B>)>,
+    /// The node that was asked last, and how many requests it had been sent before.
+    asked: Option<(NodeId, u32)>,
     reads_back: bool,
     is_json: bool,
 }
@@ -84,7 +86,16 @@ impl<B: Boards> Voice for Nodes<B> {
             }
         }
         let Plan { reads_back, is_json, .. } = *plan;
-        Ok(Some(Self { bus, nodes, modes, targets, given: Vec::new(), reads_back, is_json }))
+        Ok(Some(Self {
+            bus,
+            nodes,
+            modes,
+            targets,
+            given: Vec::new(),
+            asked: None,
+            reads_back,
+            is_json,
+        }))
     }
 
     fn modes(&self) -> Modes {
@@ -95,29 +106,41 @@ impl<B: Boards> Voice for Nodes<B> {
         self.bus.now()
     }
 
-    /// Whether the latest commands have left: none replaces one that waits.
+    /// Whether the latest commands have left, and the latest READ: none replaces one that waits.
     fn is_free(&self) -> bool {
-        self.given.iter().all(|(node, _)| self.bus.master().is_set_point_sent(*node))
+        let master = self.bus.master();
+        self.given.iter().all(|(node, _)| master.is_set_point_sent(*node))
+            && self.asked.is_none_or(|(node, before)| {
+                self.requests(node) != before || master.read_outcome(node).is_some()
+            })
     }
 
-    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure> {
-        let asked = match &due.effect {
-            _ if self.nodes.is_empty() => return self.bus.interject(&due.bytes),
+    fn give(&mut self, due: &Due, now: Instant) -> Result<Given, Failure> {
+        self.asked = None;
+        match &due.effect {
+            _ if self.nodes.is_empty() => self.bus.interject(&due.bytes).map(Given::whole),
             Effect::Write(write) => {
-                let Some(target) = self.targets.pop_front() else { return Ok(false) };
+                let Some(target) = self.targets.pop_front() else { return Ok(Given::Lost) };
                 self.bus.command(write.node, target, now)?;
                 self.given.retain(|(node, _)| *node != write.node);
                 self.given.push((write.node, target));
-                Some(write.node).filter(|_| self.reads_back)
+                if self.reads_back {
+                    // The command is what counts.
+                    let _ = self.bus.master_mut().read(write.node, now);
+                }
+                Ok(Given::Taken)
             }
-            Effect::Ask(node) => Some(*node),
-            _ => None,
-        };
-        if let Some(node) = asked {
-            // The master looks for a node that does not answer on its own.
-            let _ = self.bus.master_mut().read(node, now);
+            Effect::Ask(node) => {
+                let asked = (*node, self.requests(*node));
+                if self.bus.master_mut().read(*node, now).is_err() {
+                    // The master looks for a node that does not answer on its own.
+                    return Ok(Given::LeftOut);
+                }
+                self.asked = Some(asked);
+                Ok(Given::Taken)
+            }
+            _ => Ok(Given::Lost),
         }
-        Ok(true)
     }
 
     fn check(&self) -> Result<(), Failure> {
@@ -150,5 +173,12 @@ impl<B: Boards> Voice for Nodes<B> {
             }
         });
         told.collect()
+    }
+}
+
+impl<B: Boards> Nodes<B> {
+    /// How many requests a node has been sent.
+    fn requests(&self, node: NodeId) -> u32 {
+        self.bus.master().node_statistics(node).requests
     }
 }

@@ -32,11 +32,11 @@ pub(super) trait Voice: Sized {
 
     fn now(&mut self) -> Instant;
 
-    /// Whether it can take another frame.
+    /// Whether all that it has taken has left, so that it can take another frame.
     fn is_free(&self) -> bool;
 
-    /// Takes a frame that is due; fails if it may not be sent. `false` if it did not leave whole.
-    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure>;
+    /// Takes a frame that is due; fails if it may not be sent.
+    fn give(&mut self, due: &Due, now: Instant) -> Result<Given, Failure>;
 
     /// Fails if something does not follow its command any more.
     fn check(&self) -> Result<(), Failure> {
@@ -50,8 +50,31 @@ pub(super) trait Voice: Sized {
     fn stop(self) -> Result<Vec<String>, Failure>;
 }
 
-/// Interval in which a frame that is due waits until it is taken.
-const WAIT_PERIOD: Duration = Duration::from_millis(1);
+/// What has become of a frame.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Given {
+    /// It has left.
+    Sent,
+    /// It leaves as soon as the voice is free.
+    Taken,
+    /// It did not leave whole.
+    Lost,
+    /// It is not sent: the node that it asks does not answer.
+    LeftOut,
+}
+
+impl Given {
+    /// Of a frame that has left whole, or not.
+    pub(super) const fn whole(is_whole: bool) -> Self {
+        if is_whole { Self::Sent } else { Self::Lost }
+    }
+}
+
+/// Time after which a frame that was taken and has not left is lost.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Interval in which a frame that is due waits until it is taken, and then until it has left.
+const WAIT_PERIOD: Duration = Duration::from_micros(200);
 
 /// Pause between a frame and its answer (ruling I9 asks for 50 us at least).
 const TURNAROUND: Duration = Duration::from_micros(200);
@@ -69,11 +92,12 @@ pub(super) fn play<V: Voice>(
     };
     lister.begin(voice.modes());
     let moves = plan.frames.iter().any(|due| due.effect.moves());
-    let mut playing =
-        Playing { voice, lister, teller, sum: plan.summary.unwrap_or_default(), plan };
+    let sum = plan.summary.unwrap_or_default();
+    let mut playing = Playing { voice, lister, teller, sum, taken: None, plan };
     let played = guarded(|| playing.until_over(signals));
-    let Playing { voice, lister, mut teller, mut sum, plan } = playing;
+    let Playing { voice, lister, mut teller, mut sum, plan, taken } = playing;
     sum.left = plan.frames.len();
+    sum.lost += usize::from(taken.is_some());
     if let Some(lines) = lister.end() {
         let _ = teller.say(lines);
     }
@@ -106,6 +130,8 @@ struct Playing<'a, V> {
     /// What has become of the frames. Those that did not leave whole are not sent again: they
     /// would come late.
     sum: Summary,
+    /// The frame that was taken last, until it has left: when it was due.
+    taken: Option<(Due, Instant)>,
     /// With the frames that are left.
     plan: Plan<'a>,
 }
@@ -114,29 +140,55 @@ impl<V: Voice> Playing<'_, V> {
     /// Sends each frame at its time, until the time to listen is over, a signal comes, or the voice
     /// refuses one.
     fn until_over(&mut self, signals: &Signals) -> Result<(), Failure> {
-        let start = self.voice.now();
+        let begin = self.voice.now();
+        let mut start = begin;
+        // What is said first of all, such as a stop, is not of the plan.
+        while !self.voice.is_free() && start - begin < PATIENCE && !signals.is_raised() {
+            self.voice.round(start + WAIT_PERIOD)?;
+            start = self.voice.now();
+        }
         let mut attendance = Attendance::new(start);
         let (mut end, mut free_at) = (after(start, self.plan.linger_us), start);
+        // When the line would be free if each frame had left at its time.
+        let mut free_in_time = start;
         while !signals.is_raised() {
             let now = self.voice.now();
             // First: what was due during an absence is out of date.
             attendance.check(now)?;
             self.voice.check()?;
+            if let Some((due, at)) = self.taken.take_if(|_| self.voice.is_free()) {
+                self.sum.count_sent(now - at);
+                (end, free_at) = (after(now, self.plan.linger_us), now + self.line_time(&due));
+            }
+            if self.taken.as_ref().is_some_and(|(_, at)| now - *at >= PATIENCE) {
+                break;
+            }
             let at = match self.plan.frames.front() {
-                None if now >= end => break,
+                None if now >= end && self.taken.is_none() => break,
                 None => end,
                 Some(due) => free_at.max(after(start, due.after_us)),
             };
             let mut until = at;
-            if now >= at && !self.plan.frames.is_empty() {
+            if now >= at || self.taken.is_some() {
                 until = now + WAIT_PERIOD;
-                if self.voice.is_free()
+            }
+            if now >= at {
+                if self.taken.is_none()
+                    && self.voice.is_free()
                     && let Some(due) = self.plan.frames.pop_front()
                 {
-                    let is_sent = self.voice.give(&due, now)?;
-                    self.sum.count(is_sent, now - at);
-                    end = after(now, self.plan.linger_us);
-                    free_at = now + self.line_time(&due);
+                    let at = free_in_time.max(after(start, due.after_us));
+                    free_in_time = at + self.line_time(&due);
+                    match self.voice.give(&due, now)? {
+                        Given::Sent => {
+                            self.sum.count_sent(now - at);
+                            end = after(now, self.plan.linger_us);
+                            free_at = now + self.line_time(&due);
+                        }
+                        Given::Taken => self.taken = Some((due, at)),
+                        Given::Lost => self.sum.lost += 1,
+                        Given::LeftOut => self.sum.left_out += 1,
+                    }
                     until = now;
                 }
             }

@@ -16,6 +16,8 @@ pub(crate) struct Summary {
     /// Frames that did not leave whole, and those that are left.
     pub(super) lost: usize,
     pub(super) left: usize,
+    /// READs of nodes that do not answer.
+    pub(super) left_out: usize,
     /// Of the capture: frames of the other side, echoes, and bytes between frames.
     pub(crate) other_side: usize,
     pub(crate) echoes: usize,
@@ -23,14 +25,10 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// A frame was sent, or not whole, this much later than planned.
-    pub(super) fn count(&mut self, is_sent: bool, late: Duration) {
-        if is_sent {
-            self.sent += 1;
-            self.late_us = self.late_us.max(late.as_micros());
-        } else {
-            self.lost += 1;
-        }
+    /// A frame has left, this much later than at its time.
+    pub(super) fn count_sent(&mut self, late: Duration) {
+        self.sent += 1;
+        self.late_us = self.late_us.max(late.as_micros());
     }
 
     pub(super) fn line(&self, side: Side, is_json: bool) -> String {
@@ -61,6 +59,7 @@ impl Summary {
         for (count, what, why) in [
             (self.lost, "frame", "did not leave whole"),
             (self.left, "frame", "not sent: the end came first"),
+            (self.left_out, "READ", "left out: the node does not answer"),
             (self.other_side, "frame", other),
             (self.echoes, "frame", "an echo"),
             (self.skipped_bytes as usize, "byte", "between frames"),
@@ -86,13 +85,13 @@ mod tests {
         let mut summary = Summary { sent: 1, late_us: 1234, ..Summary::default() };
         assert_eq!(summary.line(Side::Commander, false), "1 frame sent, at most 1.2 ms late");
         (summary.lost, summary.left, summary.echoes, summary.skipped_bytes) = (1, 2, 3, 1);
-        summary.other_side = 4;
+        (summary.other_side, summary.left_out) = (4, 5);
         let says = "1 frame sent, at most 1.2 ms late; 1 frame did not leave whole; 2 frames not \
-                    sent: the end came first; 4 frames of the other side, which asks; 3 frames an \
+                    sent: the end came first; 5 READs left out: the node does not answer; 4 frames of the other side, which asks; 3 frames an \
                     echo; 1 byte between frames";
         assert_eq!(summary.line(Side::Device, false), says);
         let object = "{\"event\":\"summary\",\"sent\":1,\"late_us\":1234,\"lost\":1,\"left\":2,\
-                      \"other_side\":4,\"echoes\":3,\"skipped_bytes\":1}";
+                      \"left_out\":5,\"other_side\":4,\"echoes\":3,\"skipped_bytes\":1}";
         assert_eq!(summary.line(Side::Device, true), object);
     }
 }

@@ -1,11 +1,14 @@
 //! The line of a rover, and the host that commands it.
 
-use axlewire::{time::Instant, ucp::host::HostConfig};
+use axlewire::{
+    time::{Duration, Instant},
+    ucp::host::HostConfig,
+};
 
 use super::{
     effect::{Effect, Side},
     plan::{Due, Plan},
-    playing::Voice,
+    playing::{Given, Voice},
 };
 use crate::{failure::Failure, line::Line, rover::Rover, signals::Signals};
 
@@ -16,6 +19,8 @@ pub(super) struct Wheels {
     rover: Rover,
     /// Whether the plan commands it, if only to stand still.
     is_commanded: bool,
+    /// How many commands had been sent when the latest was given.
+    commands: Option<u32>,
     is_json: bool,
 }
 
@@ -27,33 +32,36 @@ impl Voice for Wheels {
         // What else is said is a matter of the plan.
         config.sends_first_stop = plan.side == Side::Commander;
         config.low_ids_only = true;
+        // The capture has its own pace.
+        config.command_gap = Duration::ZERO;
         config.ping_period = config.ping_period.filter(|_| is_commanded);
         let mut rover = Rover::with(config, line, plan.bus.line());
         if is_commanded && !rover.find(|| signals.is_raised())? {
             return Ok(None);
         }
-        Ok(Some(Self { rover, is_commanded, is_json: plan.is_json }))
+        Ok(Some(Self { rover, is_commanded, commands: None, is_json: plan.is_json }))
     }
 
     fn now(&mut self) -> Instant {
         self.rover.now()
     }
 
-    /// Whether the robot has been told what to do.
+    /// Whether the robot has been told what to do: no command replaces one that waits.
     fn is_free(&self) -> bool {
-        self.rover.is_told()
+        self.rover.is_told() && self.commands.is_none_or(|before| self.sent() != before)
     }
 
-    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure> {
-        match due.effect {
-            Effect::Wheels(command) => match self.rover.host_mut().drive(command, now) {
-                Ok(()) => Ok(true),
-                Err(error) => Err(Failure::Failed(error.to_string())),
-            },
-            _ => {
-                self.rover.others_have_pinged();
-                self.rover.interject(&due.bytes)
-            }
+    fn give(&mut self, due: &Due, now: Instant) -> Result<Given, Failure> {
+        let Effect::Wheels(command) = due.effect else {
+            self.rover.others_have_pinged();
+            return self.rover.interject(&due.bytes).map(Given::whole);
+        };
+        // A command that is in force is repeated by the host.
+        let is_new = self.rover.host().command() != Some(command);
+        self.commands = is_new.then(|| self.sent());
+        match self.rover.host_mut().drive(command, now) {
+            Ok(()) => Ok(Given::Taken),
+            Err(error) => Err(Failure::Failed(error.to_string())),
         }
     }
 
@@ -75,5 +83,12 @@ impl Voice for Wheels {
             true => "{\"event\":\"stopped\"}".to_owned(),
             false => format!("robot: {report}, stopped"),
         }])
+    }
+}
+
+impl Wheels {
+    /// How many commands have been sent.
+    fn sent(&self) -> u32 {
+        self.rover.host().statistics().commands
     }
 }

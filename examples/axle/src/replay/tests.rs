@@ -175,6 +175,43 @@ fn the_options_reach_the_plan_and_the_answers_say_how_a_command_was_meant() {
 }
 
 #[test]
+fn only_the_echo_of_what_was_sent_is_left_out() {
+    let (read, write) = (read(), write());
+    let (sent, heard) = (Some(Direction::Out), Some(Direction::In));
+    // A WRITE of others, an echo, the same READ of others, and one that is too late for an echo.
+    let packets: [(u64, Option<Direction>, &[u8]); 6] = [
+        (0, heard, &write),
+        (10, sent, &read),
+        (11, heard, &read),
+        (20, heard, &read),
+        (30, sent, &read),
+        (1500, None, &read),
+    ];
+    let found = frames(&capture("echoes", &packets), "--move").unwrap();
+    let times: Vec<_> = found.iter().map(|(micros, _)| micros / 1000).collect();
+    assert_eq!(times, [0, 10, 20, 30, 1500]);
+}
+
+#[test]
+fn a_frame_that_a_stray_byte_holds_back_is_sent_at_its_time() {
+    let (read, answer) = (read(), answer());
+    let (sent, heard) = (Some(Direction::Out), Some(Direction::In));
+    let packets: [(u64, Option<Direction>, &[u8]); 6] = [
+        (0, sent, &read),
+        (100, sent, &[0xBB]),
+        (200, sent, &read),
+        (900, heard, &answer),
+        (1000, sent, &read),
+        (2000, sent, &read),
+    ];
+    let capture = capture("stray", &packets);
+    let args = parsed(&capture, "");
+    let (plan, _) = plan(&args).unwrap();
+    let times: Vec<_> = plan.frames.iter().map(|due| due.after_us / 1000).collect();
+    assert_eq!((times, plan.notes), (vec![0, 200, 1000, 2000], vec![]));
+}
+
+#[test]
 fn where_the_recording_program_has_sent_something_what_it_heard_of_it_is_left_out() {
     let read = read();
     let (sent, heard) = (Some(Direction::Out), Some(Direction::In));

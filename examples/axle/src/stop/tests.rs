@@ -6,9 +6,9 @@ fn stopped(answered: usize, complaints: &[&str], is_lost: bool) -> Stopped {
     Stopped {
         path: "port".to_owned(),
         answered,
-        damaged: 0,
         complaints: complaints.iter().map(|it| (*it).to_owned()).collect(),
         failure: is_lost.then(|| Failure::lost("port", "unplugged")),
+        ..Stopped::default()
     }
 }
 

@@ -56,6 +56,10 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) count: Option<u64>,
 
+    /// The line to sum up, if a capture has several: its number from 0, as decode shows it
+    #[arg(long, value_name = "N", conflicts_with = "port")]
+    pub(super) interface: Option<usize>,
+
     /// Record to this file, as axle record does, from the start; the key r ends it. Without this
     /// option, r records to a file of its own name
     #[arg(long, value_name = "FILE", conflicts_with = "files")]

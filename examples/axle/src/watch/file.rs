@@ -15,14 +15,20 @@ use crate::{
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut input = captures::open(&args.from.files, args.form)?;
-    let (mut sheet, mut found) = (Sheet::new(None), args.protocol);
+    let (mut sheet, mut found) = (Sheet::new(None), None);
     sheet.wanted = args.count;
     // The times of a capture, microseconds since the first; raw bytes have none.
     let (mut first, mut last) = (None, 0);
-    let choice = Choice { protocol: args.protocol, direction: None };
+    let choice = Choice {
+        protocol: args.protocol,
+        interface: args.interface,
+        joins_sections: true,
+        ..Choice::default()
+    };
     let walked = decode::walk(&mut input, choice, &mut sheet, |next, sheet| {
-        if *found.get_or_insert(next.protocol) != next.protocol {
-            let line = "the capture has lines of several protocols: axle decode lists them all";
+        let line = (next.protocol, next.interface);
+        if *found.get_or_insert(line) != line {
+            let line = "the capture has more than one line: choose one with --interface";
             return Err(Failure::Failed(line.to_owned()));
         }
         if let Some(micros) = next.micros {
@@ -43,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         _ => {}
     }
     // Without a frame, the table of every protocol is the same.
-    let protocol = found.unwrap_or(Protocol::Ucp);
+    let protocol = found.map(|(it, _)| it).or(args.protocol).unwrap_or(Protocol::Ucp);
     let no_table = || Table::new(protocol, Instant::from_micros(0));
     let mut table = sheet.table.unwrap_or_else(no_table);
     let mut out = io::stdout().lock();

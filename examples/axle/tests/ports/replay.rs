@@ -249,3 +249,64 @@ fn raw_bytes_need_a_protocol_and_have_an_even_pace() {
     Process::start(&replay).success();
     assert_eq!(line.said(), [Said::Read(1); 3]);
 }
+
+/// A capture that is written to a file of its own.
+fn captured(link_type: u16, packets: &[Packet<'_>]) -> String {
+    let path = fresh("captured.pcapng");
+    file(path.rsplit('/').next().unwrap(), &PcapNg::new(link_type, packets).0);
+    path
+}
+
+#[test]
+fn on_a_slow_line_the_last_command_leaves_too_and_the_summary_tells_how_late_they_were() {
+    let write =
+        |rps: u8| *WriteRequest::velocity(NodeId::N1, Rps::new(f32::from(rps)).unwrap()).as_bytes();
+    let writes: Vec<_> = (1..=5).map(write).collect();
+    let packets: Vec<Packet<'_>> =
+        writes.iter().enumerate().map(|(at, it)| (1 + at as u64 * 300_000, 2, &it[..])).collect();
+    let path = captured(147, &packets);
+    let (sim, port) = sim("ikeya --node 1:velocity --delay 0.1");
+    let replay = format!("replay {path} -p {port} --move --reply-timeout 0.4");
+    let lines = Process::start(&replay).success();
+    let summary = lines.last().unwrap();
+    let late = summary.strip_prefix("5 frames sent, at most ").unwrap().split_once(' ').unwrap().0;
+    assert!(late.parse::<f64>().unwrap() > 20.0, "{summary}");
+    sim.line("command 5.00 rps");
+    sim.line("at rest");
+}
+
+#[test]
+fn commands_of_a_rover_that_follow_each_other_closely_are_all_sent() {
+    let frames: Vec<_> = (10..20)
+        .map(|speed| MotorControl::new(speed, 0).unwrap().frame(speed as u8).as_bytes().to_vec())
+        .collect();
+    let packets: Vec<Packet<'_>> =
+        frames.iter().enumerate().map(|(at, it)| (1 + at as u64 * 5_000, 2, &it[..])).collect();
+    let path = captured(150, &packets);
+    let (_sim, port) = sim("ucp");
+    let again = fresh("closely.pcapng");
+    let replay = format!("replay {path} -p {port} --move --record {again}");
+    let lines = Process::start(&replay).success();
+    assert!(lines.last().unwrap().starts_with("10 frames sent"), "{lines:?}");
+    let (events, _) = decoded(&again);
+    let mut speeds: Vec<_> = events
+        .iter()
+        .filter(|event| event["message"] == "motor_control")
+        .map(|event| event["speed"].as_i64().unwrap())
+        .collect();
+    speeds.dedup();
+    assert_eq!(speeds, [&[0][..], &(10..20).collect::<Vec<_>>(), &[0]].concat());
+}
+
+#[test]
+fn reads_of_a_node_that_does_not_answer_are_left_out_and_told() {
+    let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
+    let read = *ReadRequest::new(NodeId::N2).as_bytes();
+    let packets: [Packet<'_>; 3] = [(1, 2, &write), (100_001, 2, &read), (200_001, 2, &read)];
+    let path = captured(147, &packets);
+    let (_sim, port) = sim("ikeya --node 1:velocity");
+    let lines = Process::start(&format!("replay {path} -p {port} --move")).success();
+    let summary = lines.last().unwrap();
+    assert!(summary.starts_with("1 frame sent"), "{summary}");
+    assert!(summary.contains("2 READs left out: the node does not answer"), "{summary}");
+}

@@ -1,14 +1,14 @@
 //! `axle stop`: stops whatever answers on a line.
 
 use std::{
-    thread,
+    fs, thread,
     time::{Duration, Instant},
 };
 
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, Rps, Slave, Target,
+        Mode, NodeId, Rps, Slave, Target, WriteRequest,
         board::ThreeMotors,
         slave::{SlaveConfig, SlaveEvent},
     },
@@ -279,4 +279,29 @@ fn a_stop_that_waits_sends_the_stop_again_to_a_node_that_is_back() {
 
 fn speeds_said(bus: &played::BusState) -> usize {
     bus.said.iter().filter(|(said, _)| matches!(said, Said::Write(..))).count()
+}
+
+#[test]
+fn on_a_line_with_jitter_no_motor_is_taken_for_a_silent_id() {
+    for (delay, jitter, seed) in [(0.1, 0.05, 1), (0.05, 0.05, 3)] {
+        let (_sim, port) = sim(&format!(
+            "ikeya --node 1:velocity --node 6:velocity --node 8:velocity --delay {delay} \
+             --jitter {jitter} --seed {seed}"
+        ));
+        // A pause inside a packet may cost it.
+        for _ in 0..5 {
+            for node in [NodeId::N1, NodeId::N6, NodeId::N8] {
+                let turn = WriteRequest::velocity(node, Rps::new(2.0).unwrap());
+                fs::write(&port, turn.as_bytes()).unwrap();
+                thread::sleep(Duration::from_millis(100));
+            }
+        }
+        let stop = Process::start(&format!("stop --port {port} --protocol ikeya")).end();
+        let is_told = |node: u8| {
+            let of = format!("node {node}");
+            stop.stdout.iter().chain(&stop.stderr).any(|line| line.contains(&of))
+        };
+        assert!([1, 6, 8].into_iter().all(is_told), "{delay} {jitter} {seed}: {stop:?}");
+        assert!(stop.code == Some(1) || stop.stdout.len() == 4, "{stop:?}");
+    }
 }

@@ -21,11 +21,19 @@ impl PcapNg {
         file
     }
 
-    /// Adds an interface with a name.
+    /// Adds an interface.
     pub(crate) fn interface(&mut self, link_type: u16) {
+        self.named(link_type, "tty0");
+    }
+
+    /// Adds an interface with this name.
+    pub(crate) fn named(&mut self, link_type: u16, name: &str) {
         let mut body = u32::from(link_type).to_le_bytes().to_vec();
         body.extend([0; 4]);
-        body.extend([2, 0, 4, 0, b't', b't', b'y', b'0', 0, 0, 0, 0]);
+        body.extend([2, 0, name.len() as u8, 0]);
+        body.extend(name.bytes());
+        body.resize(body.len().next_multiple_of(4), 0);
+        body.extend([0; 4]);
         self.block(1, &body);
     }
 

@@ -482,8 +482,7 @@ pub extern "C" fn axle_ikeya_master_config_direct(
 pub extern "C" fn axle_ikeya_master_config_usb_adapter(
     config: *mut axle_ikeya_master_config,
 ) -> axle_result {
-    Out::new(config)
-        .map_or_else(|error| error, |out| out.write(MasterConfig::usb_adapter().into()))
+    Out::new(config).map_or_else(|error| error, |out| out.write(MasterConfig::usb_adapter().into()))
 }
 
 pub(crate) fn get<M: Memory, T>(
@@ -643,9 +642,7 @@ macro_rules! master {
             counts: *mut axle_ikeya_node_statistics,
         ) -> axle_result {
             match node_from(node) {
-                Ok(node) => {
-                    get(master, counts, |master| Some(master.node_statistics(node).into()))
-                }
+                Ok(node) => get(master, counts, |master| Some(master.node_statistics(node).into())),
                 Err(error) => error,
             }
         }

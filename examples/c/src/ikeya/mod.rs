@@ -40,8 +40,7 @@ plain!(axle_ikeya_position);
 /// Counts of a turn.
 pub const AXLE_IKEYA_COUNTS_PER_REVOLUTION: i32 = 8192;
 
-const _: () =
-    assert!(AXLE_IKEYA_COUNTS_PER_REVOLUTION == ikeya::Position::COUNTS_PER_REVOLUTION);
+const _: () = assert!(AXLE_IKEYA_COUNTS_PER_REVOLUTION == ikeya::Position::COUNTS_PER_REVOLUTION);
 
 /// The position as counts in all.
 #[unsafe(no_mangle)]

@@ -156,7 +156,8 @@ fn of_one(packet: ikeya::Packet<'_>) -> axle_ikeya_packet {
             (AXLE_IKEYA_PACKET_POSITION, 0.0, answer.position())
         }
     };
-    let position = [position.into(), axle_ikeya_position::default(), axle_ikeya_position::default()];
+    let position =
+        [position.into(), axle_ikeya_position::default(), axle_ikeya_position::default()];
     let velocity_rps = [velocity, 0.0, 0.0];
     axle_ikeya_packet { kind, node: packet.id().get(), motors: 1, velocity_rps, position }
 }
@@ -164,9 +165,7 @@ fn of_one(packet: ikeya::Packet<'_>) -> axle_ikeya_packet {
 fn of_three(packet: three::Packet<'_>) -> axle_ikeya_packet {
     let none = [Position::new(0, 0); 3];
     let (kind, velocity_rps, position) = match packet {
-        three::Packet::Request(three::Request::Read(_)) => {
-            (AXLE_IKEYA_PACKET_READ, [0.0; 3], none)
-        }
+        three::Packet::Request(three::Request::Read(_)) => (AXLE_IKEYA_PACKET_READ, [0.0; 3], none),
         three::Packet::Request(three::Request::Write(write)) => {
             (AXLE_IKEYA_PACKET_WRITE, write.as_velocity(), write.as_position())
         }

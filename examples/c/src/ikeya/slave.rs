@@ -140,7 +140,16 @@ pub struct axle_ikeya_slave_statistics {
 
 fn statistics_of<B: Motors>(slave: &Slave<B>) -> axle_ikeya_slave_statistics {
     let SlaveStatistics {
-        reads, writes, refused, foreign, answers, replies, overtaken, expired, watchdog, ..
+        reads,
+        writes,
+        refused,
+        foreign,
+        answers,
+        replies,
+        overtaken,
+        expired,
+        watchdog,
+        ..
     } = *slave.statistics();
     axle_ikeya_slave_statistics {
         reads,
@@ -232,9 +241,7 @@ macro_rules! slave {
             now_us: u64,
             command: *mut axle_ikeya_motion,
         ) -> axle_result {
-            get(slave, command, |slave| {
-                slave.command(at(now_us)).map(axle_ikeya_motion::of_target)
-            })
+            get(slave, command, |slave| slave.command(at(now_us)).map(axle_ikeya_motion::of_target))
         }
 
         /// Changes the mode; the command in force ends.

@@ -277,9 +277,7 @@ impl From<HostEvent> for axle_ucp_host_event {
                 err: err.into(),
                 ..of(AXLE_UCP_HOST_PONG)
             },
-            HostEvent::Report(report) => {
-                Self { report: report.into(), ..of(AXLE_UCP_HOST_REPORT) }
-            }
+            HostEvent::Report(report) => Self { report: report.into(), ..of(AXLE_UCP_HOST_REPORT) },
             HostEvent::DeadMan => of(AXLE_UCP_HOST_DEAD_MAN),
             HostEvent::CalibrationStarted(kind) => {
                 Self { calibration: kind.into(), ..of(AXLE_UCP_HOST_CALIBRATION_STARTED) }
@@ -555,9 +553,7 @@ pub extern "C" fn axle_ucp_host_start_calibration(
     calibration: axle_ucp_calibration,
     now_us: u64,
 ) -> axle_result {
-    call(host, |host| {
-        of(host.start_calibration(calibration.into(), at(now_us)).map_err(of_host))
-    })
+    call(host, |host| of(host.start_calibration(calibration.into(), at(now_us)).map_err(of_host)))
 }
 
 /// Asks the robot to end a calibration; events tell of that and of the result (ruling U11).
@@ -653,4 +649,3 @@ pub extern "C" fn axle_ucp_host_get_counters(
 ) -> axle_result {
     get(host, account, |host| Some(host.counters().into()))
 }
-

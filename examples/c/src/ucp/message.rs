@@ -18,9 +18,7 @@ use super::values::{
 };
 use crate::{
     memory::{Out, bytes, bytes_mut, read},
-    result::{
-        AXLE_ERROR_STARTS_UPDATE, AXLE_ERROR_VALUE, axle_result, of_encode, of_parse,
-    },
+    result::{AXLE_ERROR_STARTS_UPDATE, AXLE_ERROR_VALUE, axle_result, of_encode, of_parse},
 };
 
 /// A message of the link. Which fields it has is said with its kind; all others are 0.
@@ -245,19 +243,17 @@ fn message_of(frame: &Frame) -> axle_ucp_message {
             version: it.version().cast_signed(),
             ..of(AXLE_UCP_MOTOR_CONTROL)
         },
-        Message::CalibrationStart(it) => axle_ucp_message {
-            calibration: it.kind().into(),
-            ..of(AXLE_UCP_CALIBRATION_START)
-        },
+        Message::CalibrationStart(it) => {
+            axle_ucp_message { calibration: it.kind().into(), ..of(AXLE_UCP_CALIBRATION_START) }
+        }
         Message::CalibrationStartAck(it) => axle_ucp_message {
             calibration: it.kind().into(),
             err: it.err().into(),
             ..of(AXLE_UCP_CALIBRATION_START_ACK)
         },
-        Message::CalibrationEnd(it) => axle_ucp_message {
-            calibration: it.kind().into(),
-            ..of(AXLE_UCP_CALIBRATION_END)
-        },
+        Message::CalibrationEnd(it) => {
+            axle_ucp_message { calibration: it.kind().into(), ..of(AXLE_UCP_CALIBRATION_END) }
+        }
         Message::CalibrationEndAck(it) => axle_ucp_message {
             calibration: it.kind().into(),
             err: it.err().into(),
@@ -268,10 +264,9 @@ fn message_of(frame: &Frame) -> axle_ucp_message {
             version: it.version().cast_signed(),
             ..of(AXLE_UCP_REPORT)
         },
-        Message::Report(Report::Document(it)) => axle_ucp_message {
-            telemetry: it.telemetry().into(),
-            ..of(AXLE_UCP_DOCUMENT_REPORT)
-        },
+        Message::Report(Report::Document(it)) => {
+            axle_ucp_message { telemetry: it.telemetry().into(), ..of(AXLE_UCP_DOCUMENT_REPORT) }
+        }
         Message::ImuBias(it) => {
             axle_ucp_message { imu_bias: (*it).into(), ..of(AXLE_UCP_IMU_BIAS) }
         }
@@ -297,10 +292,9 @@ fn message_of(frame: &Frame) -> axle_ucp_message {
         Message::OtaAck(it) => {
             axle_ucp_message { ota_status: it.status().into(), ..of(AXLE_UCP_OTA_ACK) }
         }
-        Message::SetNetworkState(it) => axle_ucp_message {
-            network_state: it.state().into(),
-            ..of(AXLE_UCP_SET_NETWORK_STATE)
-        },
+        Message::SetNetworkState(it) => {
+            axle_ucp_message { network_state: it.state().into(), ..of(AXLE_UCP_SET_NETWORK_STATE) }
+        }
         Message::SetNetworkStateWide(it) => axle_ucp_message {
             network_state: it.state().into(),
             ..of(AXLE_UCP_SET_NETWORK_STATE_WIDE)

@@ -29,6 +29,7 @@ fn a_second_recording_is_another_file() {
         json: false,
         micros: None,
         count: None,
+        interface: None,
         record: Some(named.clone()),
     };
     let mut recorder =
