@@ -1,0 +1,37 @@
+/* What node.c uses of ST's HAL, with its names; and three functions of a board.
+ *
+ * In a project of yours, ST's header takes its place. hal.c is for QEMU, which has no DMA: it fills
+ * the buffer in the interrupt of each byte, and raises the callback as DMA and an idle line do. */
+#ifndef HAL_H
+#define HAL_H
+
+#include <stdint.h>
+
+typedef enum { HAL_OK, HAL_ERROR, HAL_BUSY, HAL_TIMEOUT } HAL_StatusTypeDef;
+typedef enum { GPIO_PIN_RESET, GPIO_PIN_SET } GPIO_PinState;
+typedef struct {
+    uint8_t *pRxBuffPtr;
+    uint16_t RxXferSize, RxXferCount;
+} UART_HandleTypeDef;
+
+extern UART_HandleTypeDef huart1;
+
+HAL_StatusTypeDef HAL_Init(void);
+HAL_StatusTypeDef HAL_UARTEx_ReceiveToIdle_DMA(UART_HandleTypeDef *uart, uint8_t *to, uint16_t size);
+HAL_StatusTypeDef HAL_UART_Transmit(UART_HandleTypeDef *uart, const uint8_t *from, uint16_t size,
+                                    uint32_t timeout_ms);
+void HAL_UARTEx_RxEventCallback(UART_HandleTypeDef *uart, uint16_t size);
+
+/* A port and a pin of the board. */
+#define DRIVER_ENABLE 8
+void HAL_GPIO_WritePin(uint16_t pin, GPIO_PinState state);
+
+/* A timer of 32 bits that counts microseconds, such as TIM2. */
+uint32_t HAL_Micros(void);
+/* Whether this is QEMU, whose port is slower than a UART. */
+int HAL_IsEmulated(void);
+
+int main(void);
+void reset(void);
+
+#endif

@@ -1,0 +1,75 @@
+/* A motor node of an RS485 bus on an STM32F405, in the style of ST's HAL.
+ *
+ * DMA fills a ring, and an idle line or a full half of it raises the callback, which only notes how
+ * far it is. All else is done in the main loop: nothing is called from an interrupt. */
+#include <axlewire.h>
+
+#include "hal.h"
+
+#define NODE 1 /* 1 to 8 */
+#define STEP_US 1000
+
+static axle_ikeya_slave slave;
+static axle_clock32 since_start;
+static uint8_t ring[256];
+static volatile uint16_t filled; /* DMA writes here next */
+
+static uint64_t now_us(void) { return axle_clock32_at(&since_start, HAL_Micros()); }
+
+void HAL_UARTEx_RxEventCallback(UART_HandleTypeDef *uart, uint16_t size) {
+    (void)uart;
+    filled = size % sizeof ring;
+}
+
+/* Hands in what has come since the last call. */
+static void receive(void) {
+    static uint16_t taken;
+    const uint64_t empty_at = now_us();
+    const uint16_t end = filled;
+    if (end < taken) {
+        axle_ikeya_slave_handle_input(&slave, ring + taken, sizeof ring - taken, now_us());
+        taken = 0;
+    }
+    axle_ikeya_slave_handle_input(&slave, ring + taken, (size_t)(end - taken), now_us());
+    taken = end;
+    axle_ikeya_slave_handle_timeout(&slave, empty_at);
+}
+
+/* Sends the answer, if one is due. The transceiver drives the line only meanwhile. */
+static void answer(void) {
+    const uint8_t *frame;
+    size_t length;
+    while (axle_ikeya_slave_poll_transmit(&slave, now_us(), &frame, &length) == AXLE_OK) {
+        HAL_GPIO_WritePin(DRIVER_ENABLE, GPIO_PIN_SET);
+        if (HAL_UART_Transmit(&huart1, frame, (uint16_t)length, 2) != HAL_OK)
+            axle_ikeya_slave_handle_transmit(&slave, AXLE_TRANSMIT_CUT_OFF, now_us());
+        HAL_GPIO_WritePin(DRIVER_ENABLE, GPIO_PIN_RESET);
+    }
+}
+
+/* A motor that comes to its speed within some 50 ms. Yours is a PWM and an encoder. */
+static void turn(uint64_t now) {
+    static float rps;
+    axle_ikeya_motion command = {0};
+    /* Without a command, or with one that is too old, it stands still. */
+    if (axle_ikeya_slave_command(&slave, now, &command) != AXLE_OK) command.velocity_rps[0] = 0;
+    rps += (command.velocity_rps[0] - rps) / 16;
+    axle_ikeya_slave_set_velocity(&slave, rps > -1e-3f && rps < 1e-3f ? 0 : rps);
+}
+
+int main(void) {
+    axle_ikeya_slave_config config;
+    HAL_Init();
+    axle_ikeya_slave_config_direct(&config);
+    if (HAL_IsEmulated()) axle_ikeya_slave_config_usb_adapter(&config);
+    config.watchdog_us = 500000;
+    axle_ikeya_slave_init(&slave, sizeof slave, NODE, AXLE_IKEYA_MODE_VELOCITY, &config, now_us());
+    HAL_UARTEx_ReceiveToIdle_DMA(&huart1, ring, sizeof ring);
+    for (uint64_t step_at = now_us();;) {
+        receive();
+        answer();
+        if (now_us() < step_at) continue;
+        turn(step_at);
+        step_at += STEP_US;
+    }
+}
