@@ -85,7 +85,7 @@ impl From<ikeya::Position> for axle_ikeya_position {
 
 impl From<axle_ikeya_position> for ikeya::Position {
     fn from(position: axle_ikeya_position) -> Self {
-        Self::new(position.rotation, position.count)
+        Self::new(position.count, position.rotation)
     }
 }
 
@@ -184,4 +184,16 @@ pub(crate) const fn mode_from(mode: axle_ikeya_mode) -> Result<Mode, axle_result
 
 pub(crate) fn node_from(node: u8) -> Result<NodeId, axle_result> {
     NodeId::new(node).map_err(of_encode)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counts_of_a_position_are_8192_for_each_rotation_and_one_for_each_count() {
+        let position = axle_ikeya_position { rotation: 2, count: -3 };
+        assert_eq!(axle_ikeya_position_counts(position), 16_381);
+        assert_eq!(axle_ikeya_position::from(ikeya::Position::from(position)), position);
+    }
 }
