@@ -56,6 +56,9 @@ macro_rules! object {
 }
 
 /// Puts a value into the memory, which has this size in the view of the caller.
+///
+/// What is there before is not looked at: it may be anything, even what a processor left behind
+/// that was reset during a call.
 pub(crate) fn init<M: Memory>(
     memory: *mut M,
     size: usize,
@@ -68,18 +71,12 @@ pub(crate) fn init<M: Memory>(
     if size != size_of::<M>() {
         return AXLE_ERROR_SIZE;
     }
-    // SAFETY: `checked` has seen that the pointer is aligned and not null. The memory is the
-    // caller's, of the size of an object, and a number in it has no invalid values.
-    let state = unsafe { &(*object).state };
-    if state.load(Ordering::Relaxed) == busy::<M>() {
-        return AXLE_ERROR_BUSY;
-    }
     match value() {
         Ok(value) => {
-            // SAFETY: as above; nobody else uses the object, as the caller promises.
-            unsafe { (&raw mut (*object).value).write(MaybeUninit::new(value)) };
-            compiler_fence(Ordering::SeqCst);
-            state.store(M::MAGIC, Ordering::Relaxed);
+            let (state, value) = (AtomicU32::new(M::MAGIC), MaybeUninit::new(value));
+            // SAFETY: `checked` has seen that the pointer is aligned and not null. The memory is
+            // the caller's, of the size of an object; nobody else uses it, as the caller promises.
+            unsafe { object.write(Object { state, value }) };
             AXLE_OK
         }
         Err(error) => error,
@@ -119,12 +116,16 @@ pub(crate) fn enter_with<M: Memory, R>(
     length: usize,
     function: impl FnOnce(&mut M::Value, &[u8]) -> R,
 ) -> Result<R, axle_result> {
-    let (start, end) = (memory.addr(), memory.addr().wrapping_add(size_of::<M>()));
-    if length > 0 && data.addr() < end && data.addr().saturating_add(length) > start {
-        return Err(if memory.is_null() { AXLE_ERROR_NULL } else { AXLE_ERROR_OVERLAP });
-    }
     let bytes = bytes(data, length)?;
+    apart(bytes, memory.cast(), size_of::<M>())?;
     enter(memory, |value| function(value, bytes))
+}
+
+/// Checks that bytes are not in this other memory.
+pub(crate) fn apart(bytes: &[u8], other: *const u8, size: usize) -> Result<(), axle_result> {
+    let (start, from) = (bytes.as_ptr().addr(), other.addr());
+    let meet = start < from.saturating_add(size) && from < start.saturating_add(bytes.len());
+    if meet && !bytes.is_empty() && !other.is_null() { Err(AXLE_ERROR_OVERLAP) } else { Ok(()) }
 }
 
 const fn busy<M: Memory>() -> u32 {
