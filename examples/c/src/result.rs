@@ -71,8 +71,8 @@ results! {
     AXLE_ERROR_ALIGNMENT = -5, c"a pointer is not aligned";
     /// The length is longer than any memory.
     AXLE_ERROR_TOO_LONG = -6, c"a length is longer than any memory";
-    /// The bytes are in the memory of the object itself.
-    AXLE_ERROR_OVERLAP = -7, c"the bytes are in the memory of the object";
+    /// The bytes are in the memory of the object itself, or of the output.
+    AXLE_ERROR_OVERLAP = -7, c"the bytes are in the memory of the object or output";
     /// A number that stands for none of its kinds.
     AXLE_ERROR_VALUE = -8, c"a number that has no meaning here";
 
@@ -106,27 +106,27 @@ results! {
     /// The CRC does not match (ruling B1).
     AXLE_ERROR_CRC = -42, c"CRC does not match";
 
-    /// The node is not online: it has not answered yet, or no longer does (I13).
+    /// The node is not online: it has not answered yet, or no longer does (ruling I7).
     AXLE_ERROR_NOT_ONLINE = -60, c"node is not online";
     /// The node is in the other mode (ruling I3).
     AXLE_ERROR_WRONG_MODE = -61, c"node is in the other mode";
-    /// The mode of the node is in doubt; it is being read (ruling I3).
+    /// The mode of the node is in doubt; it is being read (ruling I11).
     AXLE_ERROR_MODE_IN_DOUBT = -62, c"mode of the node is in doubt";
     /// The node is owed a stop, which comes first (ruling I12).
     AXLE_ERROR_STOP_OWED = -63, c"node is owed a stop";
     /// The node has no set-point that could be confirmed.
     AXLE_ERROR_NO_SET_POINT = -64, c"node has no set-point";
 
-    /// The robot is not heard (ruling U10).
+    /// The robot is not heard (ruling U16).
     AXLE_ERROR_LINK_DOWN = -80, c"robot is not heard";
-    /// A calibration request is not answered yet.
+    /// A calibration request is not answered yet, or its event has no room yet.
     AXLE_ERROR_CALIBRATING = -81, c"a calibration request is pending";
     /// A kind of calibration that shipped robots do not know.
     AXLE_ERROR_CALIBRATION_KIND = -82, c"unknown kind of calibration";
     /// The robot hangs on such an id, and `low_ids_only` is set (ruling U14).
     AXLE_ERROR_LOW_IDS_ONLY = -83, c"not sent to a robot of low ids only";
-    /// The robot is commanded to move.
-    AXLE_ERROR_MOVING = -84, c"robot is commanded to move";
+    /// The robot is not seen to stand still behind a stop (ruling U16).
+    AXLE_ERROR_MOVING = -84, c"robot is not seen to stand still";
     /// A firmware update is going on.
     AXLE_ERROR_UPDATING = -85, c"a firmware update is going on";
 

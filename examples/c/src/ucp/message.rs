@@ -17,7 +17,7 @@ use super::values::{
     axle_ucp_network_state, axle_ucp_ota_status, axle_ucp_telemetry,
 };
 use crate::{
-    memory::{Out, bytes, bytes_mut, read},
+    memory::{Out, apart, bytes, bytes_mut, read},
     result::{AXLE_ERROR_STARTS_UPDATE, AXLE_ERROR_VALUE, axle_result, of_encode, of_parse},
 };
 
@@ -139,8 +139,9 @@ const _: () = assert!(AXLE_UCP_FRAME_MAX_LENGTH == axlewire::ucp::MAX_LEN);
 ///
 /// Fails with `AXLE_ERROR_PERCENT`, `AXLE_ERROR_STARTS_UPDATE`, `AXLE_ERROR_NETWORK_STATE`,
 /// `AXLE_ERROR_KNOWN_ID`, `AXLE_ERROR_NESTED_HEADER`, `AXLE_ERROR_BODY_TOO_LONG`,
-/// `AXLE_ERROR_BUFFER_TOO_SMALL`, or `AXLE_ERROR_VALUE` for an unknown kind, a lamp other than 0
-/// and 100, or a lamp at the back.
+/// `AXLE_ERROR_BUFFER_TOO_SMALL`, `AXLE_ERROR_OVERLAP` if the body is in `to`, or
+/// `AXLE_ERROR_VALUE` for an unknown kind, or for a motor command with a version, with a lamp other
+/// than 0 and 100, or with a lamp at the back.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_encode(
     message: *const axle_ucp_message,
@@ -184,6 +185,7 @@ fn encode(of: &axle_ucp_message, to: &mut [u8]) -> Result<usize, axle_result> {
         }
         AXLE_UCP_UNKNOWN => {
             let body = bytes(of.body, of.body_length)?;
+            apart(body, to.as_ptr(), to.len())?;
             written(RawFrame { id: of.id, index: of.index, body }.encode(to))
         }
         _ => Err(AXLE_ERROR_VALUE),
@@ -192,9 +194,11 @@ fn encode(of: &axle_ucp_message, to: &mut [u8]) -> Result<usize, axle_result> {
 
 /// Never one that starts an update (ruling U7).
 fn motor_control(of: &axle_ucp_message) -> Result<MotorControl, axle_result> {
+    if of.version > 38 {
+        return Err(AXLE_ERROR_STARTS_UPDATE);
+    }
     let command = MotorControl::new(of.speed_pct, of.turn_pct).map_err(of_encode)?;
     match (of.version, of.front_led, of.back_led) {
-        (1.., ..) | (..0, ..) => Err(AXLE_ERROR_STARTS_UPDATE),
         (0, 0, 0) => Ok(command.with_front_led(false)),
         (0, 100, 0) => Ok(command.with_front_led(true)),
         _ => Err(AXLE_ERROR_VALUE),
