@@ -282,7 +282,7 @@ object! {
 }
 
 /// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
-/// `sizeof *decoder`.
+/// `sizeof *decoder`. Never call it during another call with the same object.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ikeya_decoder_init(
     decoder: *mut axle_ikeya_decoder,
@@ -292,7 +292,8 @@ pub extern "C" fn axle_ikeya_decoder_init(
     init(decoder, size, || IkeyaDecoder::new(framing))
 }
 
-/// Makes an empty decoder. `size` is `sizeof *decoder`.
+/// Makes an empty decoder. `size` is `sizeof *decoder`. Never call it during another call with the
+/// same object.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_decoder_init(
     decoder: *mut axle_ucp_decoder,

@@ -160,23 +160,23 @@ pub const AXLE_IKEYA_MASTER_DISCOVERY_DONE: u8 = 2;
 pub const AXLE_IKEYA_MASTER_STATUS: u8 = 3;
 /// The health of a node changed: `node`, `health`, `failures`.
 pub const AXLE_IKEYA_MASTER_HEALTH: u8 = 4;
-/// A requested READ failed: `node`, `cause`.
+/// A READ failed after its last attempt: `node`, `cause`.
 pub const AXLE_IKEYA_MASTER_READ_FAILED: u8 = 5;
-/// A node changed its mode: `node`, `mode`.
+/// A node changed its mode, which ends its set-point: `node`, `mode` (ruling I11).
 pub const AXLE_IKEYA_MASTER_MODE_CHANGED: u8 = 6;
-/// The mode of a node is in doubt: `node` (ruling I3).
+/// The mode of a node is still in doubt after six exchanges: `node` (ruling I11).
 pub const AXLE_IKEYA_MASTER_MODE_IN_DOUBT: u8 = 7;
 /// The set-point that was to be confirmed has arrived: `node`.
 pub const AXLE_IKEYA_MASTER_CONFIRMED: u8 = 8;
 /// It is not known whether it has: `node`, `cause`.
 pub const AXLE_IKEYA_MASTER_NOT_CONFIRMED: u8 = 9;
-/// A stop was received by its node, whose motor may still turn: `node` (ruling I12).
+/// A stop is confirmed; the motor may still turn: `node` (ruling I12).
 pub const AXLE_IKEYA_MASTER_STOPPED: u8 = 10;
 /// A motor that was stopped is seen to be at rest: `node` (ruling I12).
 pub const AXLE_IKEYA_MASTER_STANDING_STILL: u8 = 11;
 /// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
 pub const AXLE_IKEYA_MASTER_STILL_MOVING: u8 = 12;
-/// A stop cannot be sent for now: `node` (ruling I12).
+/// The same for a node that is owed a stop, which is not written: `node` (rulings I11, I12).
 pub const AXLE_IKEYA_MASTER_STOP_BLOCKED: u8 = 13;
 /// The dead-man has fired (ruling I13).
 pub const AXLE_IKEYA_MASTER_DEAD_MAN: u8 = 14;
@@ -189,25 +189,25 @@ pub const AXLE_IKEYA_HEALTH_UNKNOWN: u8 = 0;
 pub const AXLE_IKEYA_HEALTH_ONLINE: u8 = 1;
 /// The node has missed some answers.
 pub const AXLE_IKEYA_HEALTH_SUSPECT: u8 = 2;
-/// The node no longer answers (ruling I8).
+/// The node no longer answers (ruling I7).
 pub const AXLE_IKEYA_HEALTH_ABNORMAL: u8 = 3;
 
 /// No answer.
 pub const AXLE_IKEYA_CAUSE_SILENT: u8 = 1;
 /// A damaged answer.
 pub const AXLE_IKEYA_CAUSE_DAMAGED: u8 = 2;
-/// Another answer than the one that was asked for.
+/// Another node, another mode, too early or too late.
 pub const AXLE_IKEYA_CAUSE_UNEXPECTED: u8 = 3;
-/// The request was dropped.
+/// The set-point to be confirmed was dropped.
 pub const AXLE_IKEYA_CAUSE_DROPPED: u8 = 4;
 /// A cause that is newer than this header.
 pub const AXLE_IKEYA_CAUSE_OTHER: u8 = 255;
 
 /// No stop was asked for.
 pub const AXLE_IKEYA_STOP_NOT_ASKED: u8 = 0;
-/// The stop is owed: not yet received by the node.
+/// The stop is owed: not confirmed yet.
 pub const AXLE_IKEYA_STOP_OWED: u8 = 1;
-/// The stop was received; the motor may still turn.
+/// The stop is confirmed; the motor may still turn.
 pub const AXLE_IKEYA_STOP_CONFIRMED: u8 = 2;
 /// The motor is seen to be at rest.
 pub const AXLE_IKEYA_STOP_STANDING_STILL: u8 = 3;
@@ -305,9 +305,9 @@ pub struct axle_ikeya_node {
     pub stop: u8,
     /// 1 if the latest set-point has left.
     pub is_set_point_sent: u8,
-    /// 1 if the mode is in doubt (ruling I3).
+    /// 1 if the mode is in doubt (ruling I11).
     pub is_mode_in_doubt: u8,
-    /// Why the latest answer failed: one of `AXLE_IKEYA_CAUSE_`; 0 if none has.
+    /// Why the latest READ that failed did so: one of `AXLE_IKEYA_CAUSE_`; 0 if none has.
     pub last_failure: u8,
     /// 1 if the latest requested READ has been answered or has failed.
     pub is_read_over: u8,
@@ -403,7 +403,7 @@ pub struct axle_ikeya_master_statistics {
     pub reads: u32,
     /// WRITEs sent.
     pub writes: u32,
-    /// Bytes that came when no answer was due.
+    /// Bytes dropped because they came before a request.
     pub stale_bytes: u32,
     /// How often the dead-man has fired.
     pub dead_man: u32,
@@ -420,17 +420,17 @@ impl From<MasterStatistics> for axle_ikeya_master_statistics {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct axle_ikeya_node_statistics {
-    /// Requests that are answered.
+    /// Requests that expect an answer.
     pub requests: u32,
     /// Answers in their window.
     pub replies: u32,
-    /// Requests without an answer.
+    /// Windows that closed without an answer, for whatever reason.
     pub timeouts: u32,
-    /// Damaged answers.
+    /// Of these, windows with bytes but no packet.
     pub crc_errors: u32,
     /// Answers that came before the line could have carried them.
     pub early: u32,
-    /// Answers that came too late.
+    /// Answers outside their window, or in that of another node.
     pub late: u32,
     /// Answers of another mode than known.
     pub other_mode: u32,
@@ -533,7 +533,8 @@ fn set_position<B: Motors>(
 /// The functions of a master with these names, besides those of every role.
 macro_rules! master {
     ($master:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident $node_statistics:ident $counters:ident) => {
-        /// Makes a master, which first asks all ids. `size` is `sizeof *master`.
+        /// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
+        /// call it during another call with the same object.
         #[unsafe(no_mangle)]
         pub extern "C" fn $init(
             master: *mut $master,
@@ -553,14 +554,14 @@ macro_rules! master {
             get(master, event, |master| master.poll_event().map(Into::into))
         }
 
-        /// Asks all ids again.
+        /// Asks all ids of this bus that are not online. During a discovery it changes nothing.
         #[unsafe(no_mangle)]
         pub extern "C" fn $discover(master: *mut $master, now_us: u64) -> axle_result {
             of(enter(master, |master| master.discover(at(now_us))))
         }
 
-        /// Stops a node: sent before anything else, repeated until it is confirmed and the motor
-        /// is at rest, whatever else is commanded meanwhile (ruling I12).
+        /// Stops a node: sent before anything else, and repeated until the motor is seen to be at
+        /// rest, or until a set-point, which is refused before the stop is confirmed (I12).
         #[unsafe(no_mangle)]
         pub extern "C" fn $stop(master: *mut $master, node: u8, now_us: u64) -> axle_result {
             of_node(master, node, |master, node| {

@@ -120,11 +120,11 @@ pub struct axle_ikeya_slave_statistics {
     pub reads: u32,
     /// WRITEs of this node.
     pub writes: u32,
-    /// WRITEs that were refused: their value is none of the mode.
+    /// Of these, refused: a speed that is not a finite number (ruling I4).
     pub refused: u32,
     /// Packets of other nodes.
     pub foreign: u32,
-    /// Answers of other nodes, on two wires.
+    /// Answers of other nodes, on two wires, and its own if it hears them.
     pub answers: u32,
     /// Answers sent.
     pub replies: u32,
@@ -208,7 +208,8 @@ object! {
 /// The functions of a slave with these names, besides those of every role.
 macro_rules! slave {
     ($slave:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident $counters:ident) => {
-        /// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`.
+        /// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`. Never call
+        /// it during another call with the same object.
         #[unsafe(no_mangle)]
         pub extern "C" fn $init(
             slave: *mut $slave,

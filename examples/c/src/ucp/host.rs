@@ -31,7 +31,7 @@ pub struct axle_ucp_host_config {
     pub baud: u32,
     /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
     pub command_period_us: u32,
-    /// Shortest pause between two different motor commands; 20 ms.
+    /// Shortest pause between two different motor commands; 20 ms, at most 50.
     pub command_gap_us: u32,
     /// Silence of the application after which a robot is told to stand still (ruling U10); 500 ms.
     pub dead_man_us: u32,
@@ -408,7 +408,7 @@ pub struct axle_ucp_host_statistics {
     pub pings: u32,
     /// Pings without a pong.
     pub pings_lost: u32,
-    /// Pings that arrived damaged.
+    /// Pongs that tell of a damaged ping, or have another code than 0.
     pub pings_damaged: u32,
     /// Pongs that nobody asked for.
     pub pongs_unasked: u32,
@@ -416,9 +416,9 @@ pub struct axle_ucp_host_statistics {
     pub links_lost: u32,
     /// How often the dead-man has fired.
     pub dead_man: u32,
-    /// Requests for biases.
+    /// Requests for biases received.
     pub bias_requests: u32,
-    /// Results of calibrations.
+    /// Biases sent.
     pub biases: u32,
     /// Results that came again.
     pub results_repeated: u32,
@@ -469,7 +469,8 @@ object! {
     axle_ucp_host, AXLE_UCP_HOST_SIZE = 1960, 245 words of Host<MemoryStore>, b"axHo"
 }
 
-/// Makes a host without biases. `size` is `sizeof *host`.
+/// Makes a host without biases. `size` is `sizeof *host`. Never call it during another call with
+/// the same object.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_init(
     host: *mut axle_ucp_host,

@@ -123,7 +123,7 @@ pub struct axle_ucp_robot_event {
 
 /// The command has changed: `command`. To move the robot, use `axle_ucp_robot_get_command`.
 pub const AXLE_UCP_ROBOT_MOTOR: u8 = 1;
-/// No valid command for 500 ms: speed and turn are 0 (ruling U10).
+/// No valid command for the time of the watchdog: speed and turn are 0 (ruling U10).
 pub const AXLE_UCP_ROBOT_WATCHDOG: u8 = 2;
 /// A calibration is to start: `calibration`, `is_repeated`.
 pub const AXLE_UCP_ROBOT_CALIBRATION_START: u8 = 3;
@@ -188,11 +188,11 @@ impl From<RobotEvent> for axle_ucp_robot_event {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct axle_ucp_robot_statistics {
-    /// Motor commands received.
+    /// Motor commands accepted.
     pub commands: u32,
-    /// Motor commands with a value out of range, which was limited.
+    /// Of these, with a speed or turn out of range, which was limited.
     pub commands_clamped: u32,
-    /// Motor commands that were refused.
+    /// Motor commands refused because they would start a firmware update (ruling U7).
     pub commands_refused: u32,
     /// How often the watchdog has fired.
     pub watchdog: u32,
@@ -204,7 +204,7 @@ pub struct axle_ucp_robot_statistics {
     pub pings: u32,
     /// Pongs sent.
     pub pongs: u32,
-    /// Calibration requests that were refused.
+    /// Calibration requests of an unknown kind, or to end one that does not run.
     pub calibration_refused: u32,
     /// Calibration requests that came again.
     pub calibration_repeats: u32,
@@ -252,7 +252,8 @@ object! {
     axle_ucp_robot, AXLE_UCP_ROBOT_SIZE = 1080, 135 words of Robot, b"axRo"
 }
 
-/// Makes a robot. `size` is `sizeof *robot`.
+/// Makes a robot. `size` is `sizeof *robot`. Never call it during another call with the same
+/// object.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_robot_init(
     robot: *mut axle_ucp_robot,
