@@ -3,7 +3,7 @@
  * Objects live in your memory: declare one, and pass its address with its size to `_init`. All else
  * of an object is private. Nothing here allocates, blocks, calls back, reads a clock or keeps a
  * global. Use an object from one thread at a time; a call from an interrupt during another call is
- * refused with AXLE_ERROR_BUSY.
+ * refused with AXLE_ERROR_BUSY. Only `_init` is not: it begins anew, whatever the memory holds.
  *
  * Functions return AXLE_OK, AXLE_NONE, or a negative error, which has changed nothing. Pointers may
  * be null or unaligned, which gives an error; what they point to must be as long as said. Outputs
@@ -46,13 +46,13 @@
 /// The health of a node changed: `node`, `health`, `failures`.
 #define AXLE_IKEYA_MASTER_HEALTH 4
 
-/// A requested READ failed: `node`, `cause`.
+/// A READ failed after its last attempt: `node`, `cause`.
 #define AXLE_IKEYA_MASTER_READ_FAILED 5
 
-/// A node changed its mode: `node`, `mode`.
+/// A node changed its mode, which ends its set-point: `node`, `mode` (ruling I11).
 #define AXLE_IKEYA_MASTER_MODE_CHANGED 6
 
-/// The mode of a node is in doubt: `node` (ruling I3).
+/// The mode of a node is still in doubt after six exchanges: `node` (ruling I11).
 #define AXLE_IKEYA_MASTER_MODE_IN_DOUBT 7
 
 /// The set-point that was to be confirmed has arrived: `node`.
@@ -61,7 +61,7 @@
 /// It is not known whether it has: `node`, `cause`.
 #define AXLE_IKEYA_MASTER_NOT_CONFIRMED 9
 
-/// A stop was received by its node, whose motor may still turn: `node` (ruling I12).
+/// A stop is confirmed; the motor may still turn: `node` (ruling I12).
 #define AXLE_IKEYA_MASTER_STOPPED 10
 
 /// A motor that was stopped is seen to be at rest: `node` (ruling I12).
@@ -70,7 +70,7 @@
 /// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
 #define AXLE_IKEYA_MASTER_STILL_MOVING 12
 
-/// A stop cannot be sent for now: `node` (ruling I12).
+/// The same for a node that is owed a stop, which is not written: `node` (rulings I11, I12).
 #define AXLE_IKEYA_MASTER_STOP_BLOCKED 13
 
 /// The dead-man has fired (ruling I13).
@@ -88,7 +88,7 @@
 /// The node has missed some answers.
 #define AXLE_IKEYA_HEALTH_SUSPECT 2
 
-/// The node no longer answers (ruling I8).
+/// The node no longer answers (ruling I7).
 #define AXLE_IKEYA_HEALTH_ABNORMAL 3
 
 /// No answer.
@@ -97,10 +97,10 @@
 /// A damaged answer.
 #define AXLE_IKEYA_CAUSE_DAMAGED 2
 
-/// Another answer than the one that was asked for.
+/// Another node, another mode, too early or too late.
 #define AXLE_IKEYA_CAUSE_UNEXPECTED 3
 
-/// The request was dropped.
+/// The set-point to be confirmed was dropped.
 #define AXLE_IKEYA_CAUSE_DROPPED 4
 
 /// A cause that is newer than this header.
@@ -109,10 +109,10 @@
 /// No stop was asked for.
 #define AXLE_IKEYA_STOP_NOT_ASKED 0
 
-/// The stop is owed: not yet received by the node.
+/// The stop is owed: not confirmed yet.
 #define AXLE_IKEYA_STOP_OWED 1
 
-/// The stop was received; the motor may still turn.
+/// The stop is confirmed; the motor may still turn.
 #define AXLE_IKEYA_STOP_CONFIRMED 2
 
 /// The motor is seen to be at rest.
@@ -379,7 +379,7 @@
 /// The command has changed: `command`. To move the robot, use `axle_ucp_robot_get_command`.
 #define AXLE_UCP_ROBOT_MOTOR 1
 
-/// No valid command for 500 ms: speed and turn are 0 (ruling U10).
+/// No valid command for the time of the watchdog: speed and turn are 0 (ruling U10).
 #define AXLE_UCP_ROBOT_WATCHDOG 2
 
 /// A calibration is to start: `calibration`, `is_repeated`.
@@ -518,9 +518,9 @@ typedef struct axle_ikeya_node {
   uint8_t stop;
   /// 1 if the latest set-point has left.
   uint8_t is_set_point_sent;
-  /// 1 if the mode is in doubt (ruling I3).
+  /// 1 if the mode is in doubt (ruling I11).
   uint8_t is_mode_in_doubt;
-  /// Why the latest answer failed: one of `AXLE_IKEYA_CAUSE_`; 0 if none has.
+  /// Why the latest READ that failed did so: one of `AXLE_IKEYA_CAUSE_`; 0 if none has.
   uint8_t last_failure;
   /// 1 if the latest requested READ has been answered or has failed.
   uint8_t is_read_over;
@@ -550,7 +550,7 @@ typedef struct axle_ikeya_master_statistics {
   uint32_t reads;
   /// WRITEs sent.
   uint32_t writes;
-  /// Bytes that came when no answer was due.
+  /// Bytes dropped because they came before a request.
   uint32_t stale_bytes;
   /// How often the dead-man has fired.
   uint32_t dead_man;
@@ -572,17 +572,17 @@ typedef struct axle_latency {
 
 /// Counts of one node.
 typedef struct axle_ikeya_node_statistics {
-  /// Requests that are answered.
+  /// Requests that expect an answer.
   uint32_t requests;
   /// Answers in their window.
   uint32_t replies;
-  /// Requests without an answer.
+  /// Windows that closed without an answer, for whatever reason.
   uint32_t timeouts;
-  /// Damaged answers.
+  /// Of these, windows with bytes but no packet.
   uint32_t crc_errors;
   /// Answers that came before the line could have carried them.
   uint32_t early;
-  /// Answers that came too late.
+  /// Answers outside their window, or in that of another node.
   uint32_t late;
   /// Answers of another mode than known.
   uint32_t other_mode;
@@ -688,11 +688,11 @@ typedef struct axle_ikeya_slave_statistics {
   uint32_t reads;
   /// WRITEs of this node.
   uint32_t writes;
-  /// WRITEs that were refused: their value is none of the mode.
+  /// Of these, refused: a speed that is not a finite number (ruling I4).
   uint32_t refused;
   /// Packets of other nodes.
   uint32_t foreign;
-  /// Answers of other nodes, on two wires.
+  /// Answers of other nodes, on two wires, and its own if it hears them.
   uint32_t answers;
   /// Answers sent.
   uint32_t replies;
@@ -751,7 +751,7 @@ typedef struct axle_ucp_host_config {
   uint32_t baud;
   /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
   uint32_t command_period_us;
-  /// Shortest pause between two different motor commands; 20 ms.
+  /// Shortest pause between two different motor commands; 20 ms, at most 50.
   uint32_t command_gap_us;
   /// Silence of the application after which a robot is told to stand still (ruling U10); 500 ms.
   uint32_t dead_man_us;
@@ -928,7 +928,7 @@ typedef struct axle_ucp_host_statistics {
   uint32_t pings;
   /// Pings without a pong.
   uint32_t pings_lost;
-  /// Pings that arrived damaged.
+  /// Pongs that tell of a damaged ping, or have another code than 0.
   uint32_t pings_damaged;
   /// Pongs that nobody asked for.
   uint32_t pongs_unasked;
@@ -936,9 +936,9 @@ typedef struct axle_ucp_host_statistics {
   uint32_t links_lost;
   /// How often the dead-man has fired.
   uint32_t dead_man;
-  /// Requests for biases.
+  /// Requests for biases received.
   uint32_t bias_requests;
-  /// Results of calibrations.
+  /// Biases sent.
   uint32_t biases;
   /// Results that came again.
   uint32_t results_repeated;
@@ -1046,11 +1046,11 @@ typedef struct axle_ucp_robot_event {
 
 /// Counts of a robot.
 typedef struct axle_ucp_robot_statistics {
-  /// Motor commands received.
+  /// Motor commands accepted.
   uint32_t commands;
-  /// Motor commands with a value out of range, which was limited.
+  /// Of these, with a speed or turn out of range, which was limited.
   uint32_t commands_clamped;
-  /// Motor commands that were refused.
+  /// Motor commands refused because they would start a firmware update (ruling U7).
   uint32_t commands_refused;
   /// How often the watchdog has fired.
   uint32_t watchdog;
@@ -1062,7 +1062,7 @@ typedef struct axle_ucp_robot_statistics {
   uint32_t pings;
   /// Pongs sent.
   uint32_t pongs;
-  /// Calibration requests that were refused.
+  /// Calibration requests of an unknown kind, or to end one that does not run.
   uint32_t calibration_refused;
   /// Calibration requests that came again.
   uint32_t calibration_repeats;
@@ -1128,7 +1128,7 @@ typedef struct axle_ucp_robot_statistics {
 /// The length is longer than any memory.
 #define AXLE_ERROR_TOO_LONG -6
 
-/// The bytes are in the memory of the object itself.
+/// The bytes are in the memory of the object itself, or of the output.
 #define AXLE_ERROR_OVERLAP -7
 
 /// A number that stands for none of its kinds.
@@ -1176,13 +1176,13 @@ typedef struct axle_ucp_robot_statistics {
 /// The CRC does not match (ruling B1).
 #define AXLE_ERROR_CRC -42
 
-/// The node is not online: it has not answered yet, or no longer does (I13).
+/// The node is not online: it has not answered yet, or no longer does (ruling I7).
 #define AXLE_ERROR_NOT_ONLINE -60
 
 /// The node is in the other mode (ruling I3).
 #define AXLE_ERROR_WRONG_MODE -61
 
-/// The mode of the node is in doubt; it is being read (ruling I3).
+/// The mode of the node is in doubt; it is being read (ruling I11).
 #define AXLE_ERROR_MODE_IN_DOUBT -62
 
 /// The node is owed a stop, which comes first (ruling I12).
@@ -1191,10 +1191,10 @@ typedef struct axle_ucp_robot_statistics {
 /// The node has no set-point that could be confirmed.
 #define AXLE_ERROR_NO_SET_POINT -64
 
-/// The robot is not heard (ruling U10).
+/// The robot is not heard (ruling U16).
 #define AXLE_ERROR_LINK_DOWN -80
 
-/// A calibration request is not answered yet.
+/// A calibration request is not answered yet, or its event has no room yet.
 #define AXLE_ERROR_CALIBRATING -81
 
 /// A kind of calibration that shipped robots do not know.
@@ -1203,7 +1203,7 @@ typedef struct axle_ucp_robot_statistics {
 /// The robot hangs on such an id, and `low_ids_only` is set (ruling U14).
 #define AXLE_ERROR_LOW_IDS_ONLY -83
 
-/// The robot is commanded to move.
+/// The robot is not seen to stand still behind a stop (ruling U16).
 #define AXLE_ERROR_MOVING -84
 
 /// A firmware update is going on.
@@ -1270,7 +1270,8 @@ axle_result axle_ikeya_master_config_direct(struct axle_ikeya_master_config *con
 /// Settings for a USB adapter, which may delay an answer by 16 ms: answers within 20 ms.
 axle_result axle_ikeya_master_config_usb_adapter(struct axle_ikeya_master_config *config);
 
-/// Makes a master, which first asks all ids. `size` is `sizeof *master`.
+/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
+/// call it during another call with the same object.
 axle_result axle_ikeya_master_init(struct axle_ikeya_master *master,
                                    size_t size,
                                    const struct axle_ikeya_master_config *config,
@@ -1280,11 +1281,11 @@ axle_result axle_ikeya_master_init(struct axle_ikeya_master *master,
 axle_result axle_ikeya_master_poll_event(struct axle_ikeya_master *master,
                                          struct axle_ikeya_master_event *event);
 
-/// Asks all ids again.
+/// Asks all ids of this bus that are not online. During a discovery it changes nothing.
 axle_result axle_ikeya_master_discover(struct axle_ikeya_master *master, uint64_t now_us);
 
-/// Stops a node: sent before anything else, repeated until it is confirmed and the motor
-/// is at rest, whatever else is commanded meanwhile (ruling I12).
+/// Stops a node: sent before anything else, and repeated until the motor is seen to be at
+/// rest, or until a set-point, which is refused before the stop is confirmed (I12).
 axle_result axle_ikeya_master_stop(struct axle_ikeya_master *master, uint8_t node, uint64_t now_us);
 
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
@@ -1374,7 +1375,8 @@ axle_result axle_ikeya_master_next_deadline(const struct axle_ikeya_master *role
 axle_result axle_ikeya_master_get_line_rules(const struct axle_ikeya_master *role,
                                              struct axle_line_rules *rules);
 
-/// Makes a master, which first asks all ids. `size` is `sizeof *master`.
+/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
+/// call it during another call with the same object.
 axle_result axle_ikeya3_master_init(struct axle_ikeya3_master *master,
                                     size_t size,
                                     const struct axle_ikeya_master_config *config,
@@ -1384,11 +1386,11 @@ axle_result axle_ikeya3_master_init(struct axle_ikeya3_master *master,
 axle_result axle_ikeya3_master_poll_event(struct axle_ikeya3_master *master,
                                           struct axle_ikeya_master_event *event);
 
-/// Asks all ids again.
+/// Asks all ids of this bus that are not online. During a discovery it changes nothing.
 axle_result axle_ikeya3_master_discover(struct axle_ikeya3_master *master, uint64_t now_us);
 
-/// Stops a node: sent before anything else, repeated until it is confirmed and the motor
-/// is at rest, whatever else is commanded meanwhile (ruling I12).
+/// Stops a node: sent before anything else, and repeated until the motor is seen to be at
+/// rest, or until a set-point, which is refused before the stop is confirmed (I12).
 axle_result axle_ikeya3_master_stop(struct axle_ikeya3_master *master,
                                     uint8_t node,
                                     uint64_t now_us);
@@ -1544,7 +1546,8 @@ axle_result axle_ikeya_dip_switches(uint8_t switches,
                                     uint8_t *node,
                                     axle_ikeya_mode *mode);
 
-/// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`.
+/// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`. Never call
+/// it during another call with the same object.
 axle_result axle_ikeya_slave_init(struct axle_ikeya_slave *slave,
                                   size_t size,
                                   uint8_t node,
@@ -1621,7 +1624,8 @@ axle_result axle_ikeya_slave_next_deadline(const struct axle_ikeya_slave *role, 
 axle_result axle_ikeya_slave_get_line_rules(const struct axle_ikeya_slave *role,
                                             struct axle_line_rules *rules);
 
-/// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`.
+/// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`. Never call
+/// it during another call with the same object.
 axle_result axle_ikeya3_slave_init(struct axle_ikeya3_slave *slave,
                                    size_t size,
                                    uint8_t node,
@@ -1719,12 +1723,13 @@ const char *axle_result_name(axle_result result);
 const char *axle_result_text(axle_result result);
 
 /// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
-/// `sizeof *decoder`.
+/// `sizeof *decoder`. Never call it during another call with the same object.
 axle_result axle_ikeya_decoder_init(struct axle_ikeya_decoder *decoder,
                                     size_t size,
                                     uint8_t framing);
 
-/// Makes an empty decoder. `size` is `sizeof *decoder`.
+/// Makes an empty decoder. `size` is `sizeof *decoder`. Never call it during another call with the
+/// same object.
 axle_result axle_ucp_decoder_init(struct axle_ucp_decoder *decoder, size_t size);
 
 /// The next frame or gap in the bytes that are held and in `*data`; advances `*data` and
@@ -1818,7 +1823,8 @@ axle_result axle_ucp_host_config_direct(struct axle_ucp_host_config *config);
 /// Settings for a USB adapter.
 axle_result axle_ucp_host_config_usb_adapter(struct axle_ucp_host_config *config);
 
-/// Makes a host without biases. `size` is `sizeof *host`.
+/// Makes a host without biases. `size` is `sizeof *host`. Never call it during another call with
+/// the same object.
 axle_result axle_ucp_host_init(struct axle_ucp_host *host,
                                size_t size,
                                const struct axle_ucp_host_config *config,
@@ -1942,8 +1948,9 @@ axle_result axle_ucp_host_get_counters(const struct axle_ucp_host *host,
 ///
 /// Fails with `AXLE_ERROR_PERCENT`, `AXLE_ERROR_STARTS_UPDATE`, `AXLE_ERROR_NETWORK_STATE`,
 /// `AXLE_ERROR_KNOWN_ID`, `AXLE_ERROR_NESTED_HEADER`, `AXLE_ERROR_BODY_TOO_LONG`,
-/// `AXLE_ERROR_BUFFER_TOO_SMALL`, or `AXLE_ERROR_VALUE` for an unknown kind, a lamp other than 0
-/// and 100, or a lamp at the back.
+/// `AXLE_ERROR_BUFFER_TOO_SMALL`, `AXLE_ERROR_OVERLAP` if the body is in `to`, or
+/// `AXLE_ERROR_VALUE` for an unknown kind, or for a motor command with a version, with a lamp other
+/// than 0 and 100, or with a lamp at the back.
 axle_result axle_ucp_encode(const struct axle_ucp_message *message,
                             uint8_t *to,
                             size_t capacity,
@@ -1960,7 +1967,8 @@ axle_result axle_ucp_robot_config_direct(struct axle_ucp_robot_config *config);
 /// Settings for a robot on a host.
 axle_result axle_ucp_robot_config_usb_adapter(struct axle_ucp_robot_config *config);
 
-/// Makes a robot. `size` is `sizeof *robot`.
+/// Makes a robot. `size` is `sizeof *robot`. Never call it during another call with the same
+/// object.
 axle_result axle_ucp_robot_init(struct axle_ucp_robot *robot,
                                 size_t size,
                                 const struct axle_ucp_robot_config *config,

@@ -99,10 +99,11 @@ pub(crate) fn enter<M: Memory, R>(
     }
     state.store(busy::<M>(), Ordering::Relaxed);
     compiler_fence(Ordering::SeqCst);
-    // SAFETY: the magic number was written by `init`, behind the value. While the state is busy no
-    // other call uses it: not in an interrupt, as it would see the state, and not in another
-    // thread, as the caller promises.
-    let value = unsafe { (*object).value.assume_init_mut() };
+    // SAFETY: as above. While the state is busy no other call uses the value: not in an interrupt,
+    // as it would see the state, and not in another thread, as the caller promises.
+    let value = unsafe { &mut (*object).value };
+    // SAFETY: the magic number was written by `init`, with the value.
+    let value = unsafe { value.assume_init_mut() };
     let result = function(value);
     compiler_fence(Ordering::SeqCst);
     state.store(M::MAGIC, Ordering::Relaxed);
@@ -141,7 +142,7 @@ fn checked<M: Memory>(memory: *mut M) -> Result<*mut Object<M::Value>, axle_resu
 fn aligned<T>(pointer: *const T) -> Result<(), axle_result> {
     if pointer.is_null() {
         Err(AXLE_ERROR_NULL)
-    } else if pointer.addr() % align_of::<T>() != 0 {
+    } else if !pointer.addr().is_multiple_of(align_of::<T>()) {
         Err(AXLE_ERROR_ALIGNMENT)
     } else {
         Ok(())
