@@ -1761,6 +1761,9 @@ axle_result axle_ikeya_decoder_commit(struct axle_ikeya_decoder *decoder, size_t
 
 /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
 /// B3). Then poll until `AXLE_NONE`.
+///
+/// A possible start of a frame at the very end is still held: if nothing follows at all,
+/// repeat it until `get_pending` gives 0.
 axle_result axle_ikeya_decoder_idle(struct axle_ikeya_decoder *decoder);
 
 /// Number of bytes that are held and undecided.
@@ -1799,6 +1802,9 @@ axle_result axle_ucp_decoder_commit(struct axle_ucp_decoder *decoder, size_t len
 
 /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
 /// B3). Then poll until `AXLE_NONE`.
+///
+/// A possible start of a frame at the very end is still held: if nothing follows at all,
+/// repeat it until `get_pending` gives 0.
 axle_result axle_ucp_decoder_idle(struct axle_ucp_decoder *decoder);
 
 /// Number of bytes that are held and undecided.

@@ -439,6 +439,9 @@ macro_rules! decoder {
 
         /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
         /// B3). Then poll until `AXLE_NONE`.
+        ///
+        /// A possible start of a frame at the very end is still held: if nothing follows at all,
+        /// repeat it until `get_pending` gives 0.
         #[unsafe(no_mangle)]
         pub extern "C" fn $idle(decoder: *mut $decoder) -> axle_result {
             of(enter(decoder, |decoder| decoder.idle()))
