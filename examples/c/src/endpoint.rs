@@ -134,7 +134,8 @@ where
 
 /// The functions of a role with these names.
 macro_rules! endpoint {
-    ($role:ident: $input:ident $old_input:ident $timeout:ident $poll:ident $sent:ident $outdated:ident $deadline:ident $rules:ident) => {
+    ($role:ident: $input:ident $old_input:ident $timeout:ident $poll:ident $sent:ident
+        $outdated:ident $deadline:ident $rules:ident) => {
         /// Takes in all received bytes, which have just arrived.
         ///
         /// Hand in all of them before the next `poll_transmit`; none is fine, too.

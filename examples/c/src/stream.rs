@@ -388,7 +388,8 @@ where
 
 /// The functions of a decoder with these names.
 macro_rules! decoder {
-    ($decoder:ident: $decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident $counters:ident) => {
+    ($decoder:ident: $decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident
+        $pending:ident $counters:ident) => {
         /// The next frame or gap in the bytes that are held and in `*data`; advances `*data` and
         /// `*length` past the bytes used. `AXLE_NONE` once all are used up.
         ///

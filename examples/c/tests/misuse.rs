@@ -213,7 +213,8 @@ fn bad_bytes<M>(object: *mut M, input: impl Fn(*const u8, usize) -> axle_result)
 }
 
 macro_rules! decoder {
-    ($decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident $counters:ident) => {
+    ($decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident
+        $counters:ident) => {
         calls! {
             $decode(held(bytes()), held(BYTES.len()), stream_event());
             $push(7);
@@ -228,7 +229,8 @@ macro_rules! decoder {
 }
 
 macro_rules! role {
-    ($input:ident $old:ident $timeout:ident $transmit:ident $transmitted:ident $outdated:ident $deadline:ident $rules:ident) => {
+    ($input:ident $old:ident $timeout:ident $transmit:ident $transmitted:ident $outdated:ident
+        $deadline:ident $rules:ident) => {
         calls! {
             $input(bytes(), BYTES.len(), 5);
             $old(bytes(), BYTES.len(), 4, 5);
@@ -275,7 +277,10 @@ fn speeds() -> *const f32 {
 }
 
 macro_rules! master {
-    ($init:ident $size:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident $node_statistics:ident $counters:ident $velocity:ident($speed:expr) $position:ident($to:expr)) => {{
+    ($init:ident $size:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident
+        $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
+        $node_statistics:ident $counters:ident $velocity:ident($speed:expr)
+        $position:ident($to:expr)) => {{
         let mut init = calls! { $init($size, master_config(), 0); };
         let calls = calls! {
             $event(out::<axle_ikeya_master_event>());
@@ -299,7 +304,8 @@ macro_rules! master {
 }
 
 macro_rules! slave {
-    ($init:ident $size:ident $event:ident $command:ident $set_mode:ident $statistics:ident $counters:ident $velocity:ident($speed:expr) $position:ident($to:expr)) => {{
+    ($init:ident $size:ident $event:ident $command:ident $set_mode:ident $statistics:ident
+        $counters:ident $velocity:ident($speed:expr) $position:ident($to:expr)) => {{
         let mut init = calls! {
             $init($size, 1, AXLE_IKEYA_MODE_VELOCITY, slave_config(), 0);
         };

@@ -532,7 +532,9 @@ fn set_position<B: Motors>(
 
 /// The functions of a master with these names, besides those of every role.
 macro_rules! master {
-    ($master:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident $node_statistics:ident $counters:ident) => {
+    ($master:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident
+        $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident
+        $statistics:ident $node_statistics:ident $counters:ident) => {
         /// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
         /// call it during another call with the same object.
         #[unsafe(no_mangle)]

@@ -207,7 +207,8 @@ object! {
 
 /// The functions of a slave with these names, besides those of every role.
 macro_rules! slave {
-    ($slave:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident $counters:ident) => {
+    ($slave:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident
+        $counters:ident) => {
         /// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`. Never call
         /// it during another call with the same object.
         #[unsafe(no_mangle)]

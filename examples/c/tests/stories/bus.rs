@@ -470,7 +470,10 @@ stories! {
         assert_eq!(bus.turn(N2, 1.5), AXLE_OK);
         bus.run(1000);
         let answers = |node| {
-            let of = |event: &&_| matches!(event, MasterEvent::Status { node: it, .. } if *it == node);
+            let of = |event: &&_| match event {
+                MasterEvent::Status { node: it, .. } => *it == node,
+                _ => false,
+            };
             bus.events.iter().filter(of).count()
         };
         assert!((45..=110).contains(&answers(N1)), "{}", answers(N1));

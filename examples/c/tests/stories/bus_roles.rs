@@ -59,7 +59,9 @@ pub(crate) trait SlaveInC: Object {
 }
 
 macro_rules! master {
-    ($it:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident $node_statistics:ident $counters:ident, $velocity:expr, $position:expr) => {
+    ($it:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident
+        $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
+        $node_statistics:ident $counters:ident, $velocity:expr, $position:expr) => {
         impl MasterInC for $it {
             fn init(it: *mut Self, config: &axle_ikeya_master_config, now: u64) -> axle_result {
                 $init(it, size_of::<Self>(), config, now)
@@ -126,7 +128,8 @@ macro_rules! master {
 }
 
 macro_rules! slave {
-    ($it:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident $counters:ident, $velocity:expr, $position:expr) => {
+    ($it:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident
+        $counters:ident, $velocity:expr, $position:expr) => {
         impl SlaveInC for $it {
             fn init(
                 it: *mut Self,

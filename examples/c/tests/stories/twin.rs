@@ -29,7 +29,8 @@ pub(crate) trait Object: Sized {
 }
 
 macro_rules! object {
-    ($object:ident: $input:ident $old:ident $timeout:ident $transmit:ident $transmitted:ident $outdated:ident $deadline:ident $rules:ident) => {
+    ($object:ident: $input:ident $old:ident $timeout:ident $transmit:ident $transmitted:ident
+        $outdated:ident $deadline:ident $rules:ident) => {
         impl crate::twin::Object for $object {
             fn input(it: *mut Self, bytes: *const u8, length: usize, now: u64) -> axle_result {
                 $input(it, bytes, length, now)
