@@ -134,11 +134,17 @@ over_the_seeds! {
 fn every_target_has_a_binary_seeds_and_a_test() {
     let known: BTreeSet<String> = targets::ALL.iter().map(|it| it.name.to_owned()).collect();
     assert_eq!(known, TESTED.iter().map(|name| (*name).to_owned()).collect());
-    assert_eq!(known, names(&folder("fuzz_targets")));
-    assert_eq!(known, names(&folder("seeds")));
+    // That of the C functions is not run here: this package does not have them.
+    let others = |folder: &Path| -> BTreeSet<_> {
+        names(folder).into_iter().filter(|name| name != "c_functions").collect()
+    };
+    assert_eq!(known, others(&folder("fuzz_targets")));
+    assert_eq!(known, others(&folder("seeds")));
     let manifest = fs::read_to_string(folder("Cargo.toml")).unwrap();
     let binaries = manifest.lines().filter_map(|line| line.strip_prefix("path = \"fuzz_targets/"));
-    assert_eq!(known, binaries.map(|it| it.trim_end_matches(".rs\"").to_owned()).collect());
+    let binaries: BTreeSet<_> =
+        binaries.map(|it| it.trim_end_matches(".rs\"").to_owned()).collect();
+    assert_eq!(known, binaries.into_iter().filter(|name| name != "c_functions").collect());
 }
 
 #[test]
