@@ -1,0 +1,349 @@
+// A motor bus and a rover on a serial port of Linux: axle::SerialBus and axle::SerialRover.
+#ifndef AXLEWIRE_LINUX_HPP
+#define AXLEWIRE_LINUX_HPP
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+#include <system_error>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "axlewire.hpp"
+
+namespace axle {
+namespace detail {
+
+inline std::error_code failure(int number) { return {number, std::generic_category()}; }
+
+inline Time steady_now() {
+    return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+/// Linux numbers the devices of pseudo-terminals from 136 to 143.
+inline bool is_pseudo_terminal(const char *path) {
+    struct stat found {};
+    return ::stat(path, &found) == 0 && major(found.st_rdev) >= 136 && major(found.st_rdev) <= 143;
+}
+
+class SerialPort {
+  public:
+    SerialPort(const char *path, std::uint32_t baud) { error_ = open(path, baud); }
+    ~SerialPort() {
+        if (file_ >= 0) ::close(file_);
+    }
+    SerialPort(const SerialPort &) = delete;
+    SerialPort &operator=(const SerialPort &) = delete;
+
+    /// Why it could not be opened.
+    std::error_code error() const { return error_; }
+
+    /// Bytes that have come; 0 if there are none, negative if the port fails: then see `errno`.
+    ssize_t read(std::uint8_t *to, std::size_t size) {
+        ssize_t count;
+        do count = ::read(file_, to, size);
+        while (count < 0 && errno == EINTR);
+        if (count < 0) return errno == EAGAIN ? 0 : -1;
+        if (count == 0) errno = EIO; // the other end has hung up
+        return count == 0 ? -1 : count;
+    }
+
+    ssize_t write(Bytes bytes) { return ::write(file_, bytes.data(), bytes.size()); }
+
+    /// Waits until all bytes have left. A port that keeps them for a second loses them: else an old
+    /// command would leave some day.
+    bool flush() {
+        const Time end = steady_now() + std::chrono::seconds{1};
+        int queued = 0;
+        while (::ioctl(file_, TIOCOUTQ, &queued) == 0 && queued > 0) {
+            if (steady_now() > end) {
+                ::tcflush(file_, TCOFLUSH);
+                return false;
+            }
+            const timespec nap{0, 200'000};
+            ::nanosleep(&nap, nullptr);
+        }
+        // What is left is in the UART.
+        return ::tcdrain(file_) == 0;
+    }
+
+    /// Waits for bytes, at most until `until`.
+    void wait(Time until) {
+        const auto left = std::max(until - steady_now(), Time{0}).count();
+        const timespec span{static_cast<time_t>(left / 1'000'000),
+                            static_cast<long>(left % 1'000'000 * 1000)};
+        pollfd readable{file_, POLLIN, 0};
+        ::ppoll(&readable, 1, &span, nullptr);
+    }
+
+  private:
+    int file_ = -1;
+    std::error_code error_;
+
+    std::error_code open(const char *path, std::uint32_t baud) {
+        file_ = ::open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+        termios line{};
+        if (file_ < 0 || ::tcgetattr(file_, &line) != 0) return failure(errno);
+        // Two programs on one line would read each other's answers.
+        if (::flock(file_, LOCK_EX | LOCK_NB) != 0) return failure(EBUSY);
+        ::cfmakeraw(&line);
+        line.c_cflag &= ~static_cast<tcflag_t>(CSTOPB | CRTSCTS);
+        line.c_cflag |= CLOCAL | CREAD;
+        if (speed_of(baud) == B0) return failure(EINVAL);
+        ::cfsetspeed(&line, speed_of(baud));
+        return ::tcsetattr(file_, TCSAFLUSH, &line) == 0 ? std::error_code{} : failure(errno);
+    }
+
+    static speed_t speed_of(std::uint32_t baud) {
+        switch (baud) {
+        case 9'600: return B9600;
+        case 19'200: return B19200;
+        case 38'400: return B38400;
+        case 57'600: return B57600;
+        case 115'200: return B115200;
+        case 230'400: return B230400;
+        case 460'800: return B460800;
+        case 500'000: return B500000;
+        case 921'600: return B921600;
+        case 1'000'000: return B1000000;
+        case 2'000'000: return B2000000;
+        default: return B0;
+        }
+    }
+};
+
+/// A master or a host on a serial port. Slaves and robots must look at their port more often.
+template <class Role>
+class Serial {
+  public:
+    using Event = typename Role::Event;
+
+    /// Why the port could not be opened. Then all else fails.
+    std::error_code error() const { return port_.error(); }
+    Role &role() { return role_; }
+    Time now() const { return steady_now(); }
+
+    /// Takes in what has come, passes the events on, and sends what is due. It waits only for its
+    /// bytes to leave. Call it often, or `run_for` instead.
+    template <class F>
+    std::error_code serve(F &&on_event) {
+        std::error_code error;
+        for (int frame = 0; frame < 8; ++frame) {
+            const auto received = receive();
+            if (!error) error = received;
+            while (const auto event = role_.poll_event()) on_event(*event);
+            const Time time = now();
+            // Events have taken long: what has come meanwhile goes first.
+            if (time - looked_at_ > std::chrono::milliseconds{10} && frame < 3) continue;
+            // Even if nothing can be received: a stop must leave.
+            const auto bytes = role_.poll_transmit(time);
+            if (!bytes) break;
+            const auto sent = send(*bytes);
+            if (!error) error = sent;
+            if (sent) break;
+        }
+        return error;
+    }
+
+    /// Serves the line until `done`, but no longer than to `end`, or until the port fails.
+    template <class Done, class F>
+    std::error_code run_until(Time end, Done &&done, F &&on_event) {
+        for (;;) {
+            if (const auto error = serve(on_event)) return error;
+            if (done() || now() >= end) return {};
+            port_.wait(std::min(end, role_.next_deadline().value_or(end)));
+        }
+    }
+
+    /// Serves the line for so long, or until the port fails.
+    template <class F>
+    std::error_code run_for(Time span, F &&on_event) {
+        return run_until(now() + span, [] { return false; }, on_event);
+    }
+    std::error_code run_for(Time span) {
+        return run_for(span, [](const Event &) {});
+    }
+
+  protected:
+    template <class Config>
+    Serial(const char *path, const Config &config)
+        : port_{path, config.baud}, role_{config, steady_now()} {}
+    ~Serial() = default;
+
+    /// The same as `run_until`, but goes on when the port has failed to take a frame. Drops events.
+    template <class Done>
+    void insist_until(Time end, Done &&done) {
+        while (!done() && now() < end) {
+            const auto error = run_until(end, done, [](const Event &) {});
+            if (error && error != failure(EAGAIN) && error != failure(ETIMEDOUT)) return;
+            port_.wait(std::min(end, now() + std::chrono::milliseconds{1}));
+        }
+    }
+
+  private:
+    SerialPort port_;
+    Role role_;
+    Time looked_at_ = steady_now();
+    /// When the port was last seen empty: all bytes have come since.
+    Time empty_at_ = looked_at_;
+    bool has_overtaken_ = false;
+
+    std::error_code receive() {
+        const std::uint32_t limit = role_.line_rules()->held_up_after_us;
+        std::array<std::uint8_t, 256> memory;
+        std::error_code error;
+        // A line is slower than so many reads. A port that always has more must not hold up a stop.
+        for (int reads = 0; reads < 16 && !error; ++reads) {
+            looked_at_ = now();
+            const ssize_t count = port_.read(memory.data(), memory.size());
+            if (count == 0) {
+                empty_at_ = looked_at_;
+                has_overtaken_ = false;
+                role_.handle_timeout(empty_at_);
+                return {};
+            }
+            if (count < 0) {
+                error = failure(errno);
+                break;
+            }
+            const Bytes bytes{memory.data(), static_cast<std::size_t>(count)};
+            const Time time = now();
+            const bool is_old =
+                limit == UINT32_MAX ? has_overtaken_ : time - empty_at_ > Time{limit};
+            if (is_old) role_.handle_old_input(bytes, empty_at_, time);
+            else role_.handle_input(bytes, time);
+        }
+        // More may wait in the port, from before what is sent now.
+        has_overtaken_ = true;
+        role_.handle_old_input({}, empty_at_, now());
+        role_.handle_timeout(now());
+        return error;
+    }
+
+    std::error_code send(Bytes frame) {
+        const ssize_t count = port_.write(frame);
+        if (count == static_cast<ssize_t>(frame.size())) {
+            role_.handle_transmit(AXLE_TRANSMIT_TAKEN, now());
+            const bool left = port_.flush();
+            role_.handle_transmit(left ? AXLE_TRANSMIT_FLUSHED : AXLE_TRANSMIT_UNFLUSHED, now());
+            return left ? std::error_code{} : failure(ETIMEDOUT);
+        }
+        const int number = count < 0 ? errno : EAGAIN;
+        role_.handle_transmit(count > 0 ? AXLE_TRANSMIT_CUT_OFF : AXLE_TRANSMIT_UNTOUCHED, now());
+        return failure(number);
+    }
+};
+
+/// On a pseudo-terminal, as of a simulated bus, bytes take no time.
+inline axle_ikeya_master_config for_port(const char *path, axle_ikeya_master_config config) {
+    if (is_pseudo_terminal(path)) config.accepts_early = 1;
+    return config;
+}
+
+} // namespace detail
+
+/// The master of a motor bus on a serial port. Its end stops what it has told to move.
+template <class M>
+class BasicSerialBus : public detail::Serial<M> {
+  public:
+    explicit BasicSerialBus(const char *path,
+                            const axle_ikeya_master_config &config = MasterConfig::usb_adapter())
+        : detail::Serial<M>(path, detail::for_port(path, config)), coast_{config.coast_us} {}
+
+    /// It waits until the stops are confirmed, not for the motors to come to rest.
+    ~BasicSerialBus() {
+        for (std::uint8_t node = 1; node <= 8; ++node) {
+            const auto known = master().node(node);
+            if (known->set_point.mode != 0 && known->stop == AXLE_IKEYA_STOP_NOT_ASKED)
+                (void)master().stop(node, this->now());
+        }
+        this->insist_until(this->now() + Time{master().bus()->stop_bound_us},
+                           [&] { return master().bus()->stops_owed == 0; });
+    }
+
+    /// Asks all ids; `is_online` then tells which have answered. Drops events.
+    std::error_code discover() {
+        master().discover(this->now());
+        const Time end = this->now() + std::chrono::seconds{10};
+        return this->run_until(
+            end, [&] { return master().bus()->is_discovering == 0; },
+            [](const typename M::Event &) {});
+    }
+
+    bool is_online(std::uint8_t node) {
+        return master().node(node)->health == AXLE_IKEYA_HEALTH_ONLINE;
+    }
+
+    /// Turns per second, from the next `serve` on.
+    template <class Rps>
+    [[nodiscard]] Status set_velocity(std::uint8_t node, Rps rps) {
+        return master().set_velocity(node, rps, this->now());
+    }
+    template <class Place>
+    [[nodiscard]] Status set_position(std::uint8_t node, Place at) {
+        return master().set_position(node, at, this->now());
+    }
+
+    /// Stops a node. True once its motor is seen to stand still; if false, it may be moving.
+    /// Drops events.
+    [[nodiscard]] bool stop(std::uint8_t node) {
+        if (!master().stop(node, this->now())) return false;
+        const auto bus = master().bus();
+        const auto stop = [&] { return master().node(node)->stop; };
+        this->insist_until(
+            this->now() + Time{bus->stop_bound_us} + coast_ + Time{bus->read_bound_us}, [&] {
+                return stop() == AXLE_IKEYA_STOP_STANDING_STILL
+                       || stop() == AXLE_IKEYA_STOP_STILL_MOVING;
+            });
+        return stop() == AXLE_IKEYA_STOP_STANDING_STILL;
+    }
+
+  private:
+    Time coast_;
+
+    M &master() { return this->role(); }
+};
+using SerialBus = BasicSerialBus<Master>;
+using SerialBus3 = BasicSerialBus<Master3>;
+
+/// The host of a rover on a serial port. Its end stops a rover that it has told to drive.
+class SerialRover : public detail::Serial<Host> {
+  public:
+    explicit SerialRover(const char *path,
+                         const axle_ucp_host_config &config = HostConfig::usb_adapter())
+        : Serial(path, config) {}
+
+    ~SerialRover() {
+        if (!role().robot_state()->is_commanded) return;
+        role().stop(now());
+        insist_until(now() + std::chrono::milliseconds{100},
+                     [&] { return role().robot_state()->is_stop_sent != 0; });
+    }
+
+    /// Percent. Counts for the time of the dead-man: call it again and again.
+    [[nodiscard]] Status drive(std::int16_t speed, std::int16_t turn) {
+        return role().set_speed(speed, turn, now());
+    }
+
+    /// Stops the rover. True once it is seen to stand still; if false, it may be moving.
+    /// Drops events.
+    [[nodiscard]] bool stop(Time within = std::chrono::seconds{3}) {
+        role().stop(now());
+        const auto is_still = [&] {
+            return role().robot_state()->stop == AXLE_UCP_STOP_STANDING_STILL;
+        };
+        insist_until(now() + within, is_still);
+        return is_still();
+    }
+};
+
+} // namespace axle
+
+#endif
