@@ -6,10 +6,17 @@ set -euo pipefail
 out=${1:?"where to? build.sh OUT"}
 here=$(cd "$(dirname "$0")" && pwd)
 target=${CARGO_TARGET_DIR:-$here/../../target}
+crate=(--manifest-path "$here/Cargo.toml")
 
 # No panic may cross into C: it ends the program.
 CARGO_PROFILE_RELEASE_PANIC=abort cargo rustc --release --quiet --target-dir "$target" \
-    --manifest-path "$here/Cargo.toml" --features std --crate-type staticlib
-mkdir -p "$out/include" "$out/lib"
-cp "$here"/include/axlewire* "$out/include"
-cp "$target/release/libaxlewire_c.a" "$out/lib/libaxlewire.a"
+    "${crate[@]}" --features std --crate-type staticlib
+version=$(cargo pkgid "${crate[@]}")
+
+mkdir -p "$out/include" "$out"/lib/{cmake/axlewire,pkgconfig}
+cp -p "$here"/include/axlewire* "$out/include"
+cp -p "$target/release/libaxlewire_c.a" "$out/lib/libaxlewire.a"
+cp "$here"/package/*.cmake "$out/lib/cmake/axlewire"
+cp "$here"/package/axlewire.pc "$out/lib/pkgconfig"
+sed -i.bak "s/@VERSION@/${version##*@}/" "$out"/lib/pkgconfig/*.pc "$out"/lib/cmake/axlewire/*.cmake
+rm "$out"/lib/{pkgconfig,cmake/axlewire}/*.bak
