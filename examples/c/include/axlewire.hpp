@@ -22,6 +22,7 @@ using Time = std::chrono::microseconds;
 /// What a command has come to: done, nothing to do (AXLE_NONE), or an error.
 class Status {
   public:
+    // cppcheck-suppress noExplicitConstructor ; what a C function returns is one
     constexpr Status(axle_result code = AXLE_OK) : code_{code} {}
     /// Done.
     constexpr explicit operator bool() const { return code_ == AXLE_OK; }
@@ -61,6 +62,7 @@ class Bytes {
     constexpr Bytes(const std::uint8_t *data, std::size_t size) : data_{data}, size_{size} {}
     template <class C, class = std::enable_if_t<std::is_convertible_v<
                            decltype(std::declval<const C &>().data()), const std::uint8_t *>>>
+    // cppcheck-suppress noExplicitConstructor ; so that a vector can be passed
     constexpr Bytes(const C &bytes) : Bytes(bytes.data(), bytes.size()) {}
     constexpr const std::uint8_t *data() const { return data_; }
     constexpr std::size_t size() const { return size_; }

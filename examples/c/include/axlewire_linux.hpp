@@ -134,10 +134,10 @@ class Serial {
     /// bytes to leave. Call it often, or `run_for` instead.
     template <class F>
     std::error_code serve(F &&on_event) {
-        std::error_code error;
+        std::error_code failed;
         for (int frame = 0; frame < 8; ++frame) {
             const auto received = receive();
-            if (!error) error = received;
+            if (!failed) failed = received;
             while (const auto event = role_.poll_event()) on_event(*event);
             const Time time = now();
             // Events have taken long: what has come meanwhile goes first.
@@ -146,17 +146,17 @@ class Serial {
             const auto bytes = role_.poll_transmit(time);
             if (!bytes) break;
             const auto sent = send(*bytes);
-            if (!error) error = sent;
+            if (!failed) failed = sent;
             if (sent) break;
         }
-        return error;
+        return failed;
     }
 
     /// Serves the line until `done`, but no longer than to `end`, or until the port fails.
     template <class Done, class F>
     std::error_code run_until(Time end, Done &&done, F &&on_event) {
         for (;;) {
-            if (const auto error = serve(on_event)) return error;
+            if (const auto failed = serve(on_event)) return failed;
             if (done() || now() >= end) return {};
             port_.wait(std::min(end, role_.next_deadline().value_or(end)));
         }
@@ -181,8 +181,8 @@ class Serial {
     template <class Done>
     void insist_until(Time end, Done &&done) {
         while (!done() && now() < end) {
-            const auto error = run_until(end, done, [](const Event &) {});
-            if (error && error != failure(EAGAIN) && error != failure(ETIMEDOUT)) return;
+            const auto failed = run_until(end, done, [](const Event &) {});
+            if (failed && failed != failure(EAGAIN) && failed != failure(ETIMEDOUT)) return;
             port_.wait(std::min(end, now() + std::chrono::milliseconds{1}));
         }
     }
@@ -198,9 +198,9 @@ class Serial {
     std::error_code receive() {
         const std::uint32_t limit = role_.line_rules()->held_up_after_us;
         std::array<std::uint8_t, 256> memory;
-        std::error_code error;
+        std::error_code failed;
         // A line is slower than so many reads. A port that always has more must not hold up a stop.
-        for (int reads = 0; reads < 16 && !error; ++reads) {
+        for (int reads = 0; reads < 16; ++reads) {
             looked_at_ = now();
             const ssize_t count = port_.read(memory.data(), memory.size());
             if (count == 0) {
@@ -210,7 +210,7 @@ class Serial {
                 return {};
             }
             if (count < 0) {
-                error = failure(errno);
+                failed = failure(errno);
                 break;
             }
             const Bytes bytes{memory.data(), static_cast<std::size_t>(count)};
@@ -224,7 +224,7 @@ class Serial {
         has_overtaken_ = true;
         role_.handle_old_input({}, empty_at_, now());
         role_.handle_timeout(now());
-        return error;
+        return failed;
     }
 
     std::error_code send(Bytes frame) {

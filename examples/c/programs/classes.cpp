@@ -108,7 +108,7 @@ static void decode() {
     CHECK(axle::IkeyaDecoder{99}.made() == AXLE_ERROR_VALUE);
 }
 
-static void count() {
+static void convert() {
     CHECK(axle::counts(*axle::position(9000)) == 9000);
     CHECK(axle::position(INT32_MAX).status() == AXLE_ERROR_POSITION);
     CHECK(axle::dip_switches(0, AXLE_IKEYA_ID_VALUE_PLUS_ONE)->node == 1);
@@ -130,6 +130,6 @@ int main() {
     turn<axle::Master3, axle::Slave3>(std::array<float, 3>{1.5f, -2, 0});
     drive();
     decode();
-    count();
+    convert();
     return failures == 0 ? 0 : 1;
 }

@@ -5,7 +5,8 @@
 #include <axlewire_linux.hpp>
 #include <cstdio>
 
-using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
 
 int main(int argc, char **argv) {
     if (argc != 2) return std::puts("rover_host PORT"), 1;
@@ -17,17 +18,17 @@ int main(int argc, char **argv) {
 
     // A robot that is not heard is not commanded.
     const auto is_heard = [&] { return rover.role().robot_state()->link == AXLE_UCP_LINK_UP; };
-    auto error = rover.run_until(rover.now() + 2s, is_heard, [](const auto &) {});
+    auto error = rover.run_until(rover.now() + seconds{2}, is_heard, [](const auto &) {});
     if (!is_heard()) return std::fprintf(stderr, "no robot answers\n"), 1;
 
-    const axle::Time end = rover.now() + 2s;
+    const axle::Time end = rover.now() + seconds{2};
     while (!error && rover.now() < end) {
         // Percent; it counts for half a second.
         if (const auto status = rover.drive(20, 0); !status) {
             std::fprintf(stderr, "%s\n", status.text().data());
             break;
         }
-        error = rover.run_for(200ms);
+        error = rover.run_for(milliseconds{200});
         if (const auto report = rover.role().take_report()) {
             const auto &seen = report->telemetry;
             std::printf("%d %d %d %d rpm, %.1f V\n", seen.rpm[0], seen.rpm[1], seen.rpm[2],
