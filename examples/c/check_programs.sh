@@ -70,10 +70,20 @@ run() {
     finish
 }
 
+# Waits until the simulator tells this.
+await() {
+    for _ in {1..100}; do
+        if grep -Eq "$1" "$work/simulator.log"; then return; fi
+        sleep 0.1
+    done
+    echo "the simulator does not tell: $1" >&2
+    return 1
+}
+
 # The line goes away while it moves: must_notice WORDS PROGRAM ARGUMENT..
 must_notice() {
     local words=$1 program=$2; shift 2
-    (sleep 1; kill "$simulator") &
+    (await "turning|moving"; kill "$simulator") &
     must_fail "$words" "$work/gcc/$program" "$work/line" "$@"
     finish
 }
@@ -96,6 +106,36 @@ simulate ikeya --node 1:velocity
 must_notice "the joint may be moving" run_component 1
 simulate ucp
 must_notice "the rover may be moving" rover_host
+
+echo "== a bus or a rover ends while it moves: it is stopped"
+cat >"$work/leave.cpp" <<'END'
+#include <axlewire_linux.hpp>
+int main(int, char **argv) {
+    const std::chrono::milliseconds second{1000};
+#ifdef ROVER
+    const std::chrono::milliseconds before_dead_man{300};
+    axle::SerialRover rover{argv[1]};
+    if (rover.run_for(second) || !rover.drive(20, 0) || rover.run_for(before_dead_man)) return 1;
+#else
+    axle::SerialBus bus{argv[1]};
+    if (bus.discover() || !bus.set_velocity(1, 2.0f) || bus.run_for(second)) return 1;
+#endif
+    return 0;
+}
+END
+g++ -std=c++17 "${strict[@]}" "${sanitized[@]}" "$work/leave.cpp" "${library[@]}" -o "$work/leave"
+simulate ikeya --node 1:velocity
+"$work/leave" "$work/line"
+await "command 0.00 rps"
+await "at rest at [1-9]"
+finish
+g++ -std=c++17 "${strict[@]}" -DROVER "$work/leave.cpp" "${library[@]}" -o "$work/leave"
+simulate ucp
+"$work/leave" "$work/line"
+await "at rest after"
+# The first command is a stop, too. One by the watchdog would be none.
+[ "$(grep -c "command: speed 0" "$work/simulator.log")" = 2 ]
+finish
 
 echo "== cmake and pkg-config"
 cmake -S . -B "$work/found" -DCMAKE_PREFIX_PATH="$work/out" >"$work/log"
