@@ -29,8 +29,8 @@ use pace::Pace;
 /// or if it would get more than --max-rps or go farther than --max-turns: a speed looks like a far
 /// position, and the reverse. The master also reads each node every 0.1 s and repeats its latest
 /// command; it leaves out READs of nodes that do not answer. The host tells a robot to stop first,
-/// repeats the command in force every 0.1 s, in place of the repeats of the capture (ruling U16), and
-/// tells the robot to stop 0.5 s after the latest one. A node that turns or falls silent and a
+/// repeats the command in force every 0.1 s, in place of the repeats of the capture (ruling U16),
+/// and tells the robot to stop 0.5 s after the latest one. A node that turns or falls silent and a
 /// robot that is no longer heard end the replay. At the end, on every error and on every signal
 /// that can be caught, what was commanded is stopped.
 ///

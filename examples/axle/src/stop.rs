@@ -32,7 +32,7 @@ use crate::{
 /// without reports may be moving, and is a failure.
 ///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
-/// within about 10 seconds, and within 40 on a line on which answers come late; Ctrl-C, Ctrl-Z and
+/// within about 10 seconds, and within 90 on a line on which answers come late; Ctrl-C, Ctrl-Z and
 /// Ctrl-\ do not cut it short.
 ///
 /// What is sent on the wire: with --protocol ikeya or ikeya-3, READ packets for ids 1 to 8, or for
@@ -157,11 +157,11 @@ impl Lines<'_> {
 /// Stops a bus if a node answers, otherwise a rover.
 fn stop_whatever(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
     let bus = stop_bus::<OneMotor>(args, lines)?;
-    if bus.answered > 0 || args.node.is_some() {
+    if bus.heard > 0 || args.node.is_some() {
         return bus.judge();
     }
     stop_rover(args, lines).map_err(|failure| match failure {
-        Failure::Failed(line) => Failure::Failed(format!("{}; {line}", bus.nothing())),
+        Failure::Failed(line) => Failure::Failed(format!("{}; {line}", bus.complaint())),
         other => other,
     })
 }
@@ -172,6 +172,8 @@ struct Stopped {
     path: String,
     /// Number of nodes that have answered.
     answered: usize,
+    /// Number of those, and of nodes that have answered out of time.
+    heard: usize,
     /// Ids that have not, if all ids were to be stopped.
     silent: Vec<NodeId>,
     /// Number of ids that gave only damaged answers.
@@ -187,6 +189,8 @@ impl Stopped {
     fn judge_each<B: Boards>(&mut self, args: &Args, bus: &Bus<B>, nodes: NodeSet, known: NodeSet) {
         for node in nodes.iter() {
             self.answered += usize::from(bus.status(node).is_some());
+            let is_heard = known.contains(node) || bus.those_heard().contains(node);
+            self.heard += usize::from(is_heard);
             self.damaged += usize::from(bus.is_damaged(node));
             match bus.halt(node) {
                 Halt::Still => {
@@ -195,7 +199,7 @@ impl Stopped {
                     tell(args, &Event::Stopped { node: Some(node), status, text });
                 }
                 Halt::Silent if known.contains(node) => self.complaints.push(format!(
-                    "node {node} has answered too late, and then no more: its motor may be moving"
+                    "node {node} has answered before, but no more: its motor may be moving"
                 )),
                 Halt::Silent if args.node.is_none() => self.silent.push(node),
                 _ => self.complaints.extend(bus.complaint(node)),
@@ -205,18 +209,21 @@ impl Stopped {
 
     /// `Ok` if something has answered and all of it is at rest.
     fn judge(self) -> Result<(), Failure> {
-        let complaint = match (self.complaints.is_empty(), self.answered) {
-            (false, _) => self.complaints.join("; "),
-            (true, 0) => self.nothing(),
-            (true, _) => return self.failure.map_or(Ok(()), Err),
-        };
+        if self.complaints.is_empty() && self.answered > 0 {
+            return self.failure.map_or(Ok(()), Err);
+        }
+        let complaint = self.complaint();
         Err(match self.failure {
             Some(failure) => failure.while_moving(&complaint),
             None => Failure::Failed(complaint),
         })
     }
 
-    fn nothing(&self) -> String {
+    /// What is not at rest, or that nothing was heard.
+    fn complaint(&self) -> String {
+        if !self.complaints.is_empty() {
+            return self.complaints.join("; ");
+        }
         let heard = if self.damaged > 0 { " (damaged bytes received)" } else { "" };
         format!("no node answers on {:?}{heard}", self.path)
     }

@@ -361,6 +361,20 @@ fn a_line_is_its_folder_and_its_port_however_both_are_written() {
 #[test]
 fn one_line_of_several_can_be_chosen() {
     let folder = folder_of("chosen", &[("a.pcapng", &["ttyS4", "ttyS5"])]);
+    let file = format!("{folder}/a.pcapng");
+    let twice = format!("{folder}/twice.cap");
+    fs::write(&twice, [fs::read(&file).unwrap(), fs::read(&file).unwrap()].concat()).unwrap();
+    for (path, number, says) in [
+        (&file, "2", "has nothing on interface 2"),
+        (&twice, "3", "interface 3 is one line with interface 1: choose that"),
+    ] {
+        for command in [&["replay", "--dry-run"][..], &["watch"]] {
+            let chosen = [command, &["--interface", number, path]].concat();
+            let (listing, code, error) = outcome(axle(&chosen).output().unwrap());
+            assert_eq!((&*listing, code), ("", Some(1)));
+            assert!(error.contains(says), "{error}");
+        }
+    }
     for command in [&["replay", "--dry-run", "--json"][..], &["watch", "--json"]] {
         let (_, code, error) = outcome(axle(&[command, &[&folder]].concat()).output().unwrap());
         assert!(code == Some(1) && error.contains("choose one with --interface"), "{error}");

@@ -52,7 +52,7 @@ static void turn(uint64_t now) {
     static float rps;
     axle_ikeya_motion command = {0};
     /* Without a command, or with one that is too old, it stands still. */
-    if (axle_ikeya_slave_command(&slave, now, &command) != AXLE_OK) command.velocity_rps[0] = 0;
+    if (axle_ikeya_slave_get_command(&slave, now, &command) != AXLE_OK) command.velocity_rps[0] = 0;
     rps += (command.velocity_rps[0] - rps) / 16;
     axle_ikeya_slave_set_velocity(&slave, rps > -1e-3f && rps < 1e-3f ? 0 : rps);
 }

@@ -10,6 +10,17 @@
  * must not be in the memory of an object. Times are microseconds of a clock of 64 bits that never
  * goes back; `axle_clock32_at` extends a timer of 32 bits.
  *
+ * The loop of a role, here of a master; each step is needed, in this order:
+ *
+ *     while ((count = read_port(bytes)) > 0)
+ *         axle_ikeya_master_handle_input(&master, bytes, count, now_us());
+ *     axle_ikeya_master_handle_timeout(&master, time_before_the_port_was_found_empty);
+ *     while (axle_ikeya_master_poll_event(&master, &event) == AXLE_OK)
+ *         act_on(&event);                  // give commands here
+ *     while (axle_ikeya_master_poll_transmit(&master, now_us(), &frame, &length) == AXLE_OK)
+ *         write_port(frame, length);       // whole; else tell axle_ikeya_master_handle_transmit
+ *     wait_for_bytes_or(axle_ikeya_master_next_deadline(&master, &at_us));
+ *
  * The rulings, such as I12, are explained in the documentation of axlewire, on the pages `ikeya`
  * and `ucp`. Before you connect a motor, read its page `safety`.
  *
@@ -309,6 +320,10 @@
 
 /// Size of the object, bytes.
 #define AXLE_UCP_HOST_SIZE 1960
+
+/// Time after a stop in which a rover is seen to stand still, microseconds: 2 s to coast, and one
+/// more until the average that it reports shows it.
+#define AXLE_UCP_COAST_US 3000000
 
 /// Host to robot: checks that the robot is there.
 #define AXLE_UCP_PING 1
@@ -626,7 +641,9 @@ typedef struct axle_line_rules {
   /// Speed of the line, bit/s; 0 if it is not known.
   uint32_t baud;
   /// How long the port may go unread before the bytes in it count as old, microseconds;
-  /// `UINT32_MAX` if they never do. Hand in older ones by `handle_old_input`.
+  /// `UINT32_MAX` if they never do. Hand in older ones by `handle_old_input`. With 0, as of a
+  /// host, bytes count from when the port was last found empty: hand in all of them so, if
+  /// others came before or a frame was sent since.
   uint32_t held_up_after_us;
 } axle_line_rules;
 
@@ -1110,107 +1127,110 @@ typedef struct axle_ucp_robot_statistics {
 #define AXLE_NONE 1
 
 /// A pointer is null.
-#define AXLE_ERROR_NULL -1
+#define AXLE_ERROR_NULL (-1)
 
 /// The memory is not of the size that this library needs: header and library are of different
 /// versions.
-#define AXLE_ERROR_SIZE -2
+#define AXLE_ERROR_SIZE (-2)
 
 /// The object has not been initialised, or its memory was overwritten.
-#define AXLE_ERROR_NOT_INITIALIZED -3
+#define AXLE_ERROR_NOT_INITIALIZED (-3)
 
 /// The object is in use: by a call that an interrupt has suspended, or by another thread.
-#define AXLE_ERROR_BUSY -4
+#define AXLE_ERROR_BUSY (-4)
 
 /// A pointer is not aligned as its type.
-#define AXLE_ERROR_ALIGNMENT -5
+#define AXLE_ERROR_ALIGNMENT (-5)
 
 /// The length is longer than any memory.
-#define AXLE_ERROR_TOO_LONG -6
+#define AXLE_ERROR_TOO_LONG (-6)
 
 /// The bytes are in the memory of the object itself, or of the output.
-#define AXLE_ERROR_OVERLAP -7
+#define AXLE_ERROR_OVERLAP (-7)
 
 /// A number that stands for none of its kinds.
-#define AXLE_ERROR_VALUE -8
+#define AXLE_ERROR_VALUE (-8)
 
 /// A node id outside 1 to 8 (ruling I1).
-#define AXLE_ERROR_NODE_ID -20
+#define AXLE_ERROR_NODE_ID (-20)
 
 /// DIP switches that select no node (ruling I2).
-#define AXLE_ERROR_DIP_SWITCH -21
+#define AXLE_ERROR_DIP_SWITCH (-21)
 
 /// NaN or infinity, where a motor needs a finite number (ruling I4).
-#define AXLE_ERROR_NOT_FINITE -22
+#define AXLE_ERROR_NOT_FINITE (-22)
 
 /// A position outside the range of count and rotation (ruling I5).
-#define AXLE_ERROR_POSITION -23
+#define AXLE_ERROR_POSITION (-23)
 
 /// A speed or turn outside -100 to 100 (rulings U6, U7).
-#define AXLE_ERROR_PERCENT -24
+#define AXLE_ERROR_PERCENT (-24)
 
 /// A network state above 255 (ruling U8).
-#define AXLE_ERROR_NETWORK_STATE -25
+#define AXLE_ERROR_NETWORK_STATE (-25)
 
 /// The buffer is too small for the frame.
-#define AXLE_ERROR_BUFFER_TOO_SMALL -26
+#define AXLE_ERROR_BUFFER_TOO_SMALL (-26)
 
 /// The body is longer than shipped robots can handle (rulings U2, U13).
-#define AXLE_ERROR_BODY_TOO_LONG -27
+#define AXLE_ERROR_BODY_TOO_LONG (-27)
 
 /// An unknown frame with the id of a known message (rulings U7, U13).
-#define AXLE_ERROR_KNOWN_ID -28
+#define AXLE_ERROR_KNOWN_ID (-28)
 
 /// An unknown frame with FD FF behind its header (ruling U13).
-#define AXLE_ERROR_NESTED_HEADER -29
+#define AXLE_ERROR_NESTED_HEADER (-29)
 
 /// A motor command that would start a firmware update (rulings U7, U13).
-#define AXLE_ERROR_STARTS_UPDATE -30
+#define AXLE_ERROR_STARTS_UPDATE (-30)
 
 /// The bytes are not as long as a packet, or as the length in its header.
-#define AXLE_ERROR_LENGTH -40
+#define AXLE_ERROR_LENGTH (-40)
 
 /// The header or the node id has a value that no packet has.
-#define AXLE_ERROR_FIELD -41
+#define AXLE_ERROR_FIELD (-41)
 
 /// The CRC does not match (ruling B1).
-#define AXLE_ERROR_CRC -42
+#define AXLE_ERROR_CRC (-42)
+
+/// The decoder is full: poll its events until `AXLE_NONE`, then push the byte again.
+#define AXLE_ERROR_FULL (-43)
 
 /// The node is not online: it has not answered yet, or no longer does (ruling I7).
-#define AXLE_ERROR_NOT_ONLINE -60
+#define AXLE_ERROR_NOT_ONLINE (-60)
 
 /// The node is in the other mode (ruling I3).
-#define AXLE_ERROR_WRONG_MODE -61
+#define AXLE_ERROR_WRONG_MODE (-61)
 
 /// The mode of the node is in doubt; it is being read (ruling I11).
-#define AXLE_ERROR_MODE_IN_DOUBT -62
+#define AXLE_ERROR_MODE_IN_DOUBT (-62)
 
 /// The node is owed a stop, which comes first (ruling I12).
-#define AXLE_ERROR_STOP_OWED -63
+#define AXLE_ERROR_STOP_OWED (-63)
 
 /// The node has no set-point that could be confirmed.
-#define AXLE_ERROR_NO_SET_POINT -64
+#define AXLE_ERROR_NO_SET_POINT (-64)
 
 /// The robot is not heard (ruling U16).
-#define AXLE_ERROR_LINK_DOWN -80
+#define AXLE_ERROR_LINK_DOWN (-80)
 
 /// A calibration request is not answered yet, or its event has no room yet.
-#define AXLE_ERROR_CALIBRATING -81
+#define AXLE_ERROR_CALIBRATING (-81)
 
 /// A kind of calibration that shipped robots do not know.
-#define AXLE_ERROR_CALIBRATION_KIND -82
+#define AXLE_ERROR_CALIBRATION_KIND (-82)
 
 /// The robot hangs on such an id, and `low_ids_only` is set (ruling U14).
-#define AXLE_ERROR_LOW_IDS_ONLY -83
+#define AXLE_ERROR_LOW_IDS_ONLY (-83)
 
 /// The robot is not seen to stand still behind a stop (ruling U16).
-#define AXLE_ERROR_MOVING -84
+#define AXLE_ERROR_MOVING (-84)
 
 /// A firmware update is going on.
-#define AXLE_ERROR_UPDATING -85
+#define AXLE_ERROR_UPDATING (-85)
 
 /// Refused for a reason that is newer than this header.
-#define AXLE_ERROR_OTHER -100
+#define AXLE_ERROR_OTHER (-100)
 
 /// The magnetometer; the host must turn the robot meanwhile.
 #define AXLE_UCP_CALIBRATION_MAGNETOMETER 1
@@ -1270,8 +1290,8 @@ axle_result axle_ikeya_master_config_direct(struct axle_ikeya_master_config *con
 /// Settings for a USB adapter, which may delay an answer by 16 ms: answers within 20 ms.
 axle_result axle_ikeya_master_config_usb_adapter(struct axle_ikeya_master_config *config);
 
-/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
-/// call it during another call with the same object.
+/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`.
+/// Never call it during another call with the same object.
 axle_result axle_ikeya_master_init(struct axle_ikeya_master *master,
                                    size_t size,
                                    const struct axle_ikeya_master_config *config,
@@ -1286,6 +1306,9 @@ axle_result axle_ikeya_master_discover(struct axle_ikeya_master *master, uint64_
 
 /// Stops a node: sent before anything else, and repeated until the motor is seen to be at
 /// rest, or until a set-point, which is refused before the stop is confirmed (I12).
+///
+/// `get_node` tells how far it is. After `stop_bound_us`, `coast_us` and `read_bound_us`, a
+/// node that is not seen to stand still may be moving.
 axle_result axle_ikeya_master_stop(struct axle_ikeya_master *master, uint8_t node, uint64_t now_us);
 
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
@@ -1375,8 +1398,8 @@ axle_result axle_ikeya_master_next_deadline(const struct axle_ikeya_master *role
 axle_result axle_ikeya_master_get_line_rules(const struct axle_ikeya_master *role,
                                              struct axle_line_rules *rules);
 
-/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
-/// call it during another call with the same object.
+/// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`.
+/// Never call it during another call with the same object.
 axle_result axle_ikeya3_master_init(struct axle_ikeya3_master *master,
                                     size_t size,
                                     const struct axle_ikeya_master_config *config,
@@ -1391,6 +1414,9 @@ axle_result axle_ikeya3_master_discover(struct axle_ikeya3_master *master, uint6
 
 /// Stops a node: sent before anything else, and repeated until the motor is seen to be at
 /// rest, or until a set-point, which is refused before the stop is confirmed (I12).
+///
+/// `get_node` tells how far it is. After `stop_bound_us`, `coast_us` and `read_bound_us`, a
+/// node that is not seen to stand still may be moving.
 axle_result axle_ikeya3_master_stop(struct axle_ikeya3_master *master,
                                     uint8_t node,
                                     uint64_t now_us);
@@ -1561,9 +1587,9 @@ axle_result axle_ikeya_slave_poll_event(struct axle_ikeya_slave *slave,
 
 /// The command in force; `AXLE_NONE` if there is none, or if it is too old for the
 /// watchdog: the motor must then be at rest. Correct at any time.
-axle_result axle_ikeya_slave_command(const struct axle_ikeya_slave *slave,
-                                     uint64_t now_us,
-                                     struct axle_ikeya_motion *command);
+axle_result axle_ikeya_slave_get_command(const struct axle_ikeya_slave *slave,
+                                         uint64_t now_us,
+                                         struct axle_ikeya_motion *command);
 
 /// Changes the mode; the command in force ends.
 axle_result axle_ikeya_slave_set_mode(struct axle_ikeya_slave *slave, axle_ikeya_mode mode);
@@ -1639,9 +1665,9 @@ axle_result axle_ikeya3_slave_poll_event(struct axle_ikeya3_slave *slave,
 
 /// The command in force; `AXLE_NONE` if there is none, or if it is too old for the
 /// watchdog: the motor must then be at rest. Correct at any time.
-axle_result axle_ikeya3_slave_command(const struct axle_ikeya3_slave *slave,
-                                      uint64_t now_us,
-                                      struct axle_ikeya_motion *command);
+axle_result axle_ikeya3_slave_get_command(const struct axle_ikeya3_slave *slave,
+                                          uint64_t now_us,
+                                          struct axle_ikeya_motion *command);
 
 /// Changes the mode; the command in force ends.
 axle_result axle_ikeya3_slave_set_mode(struct axle_ikeya3_slave *slave, axle_ikeya_mode mode);
@@ -1743,7 +1769,8 @@ axle_result axle_ikeya_decoder_decode(struct axle_ikeya_decoder *decoder,
 
 /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
 ///
-/// Poll until `AXLE_NONE` before the next byte: a full decoder refuses bytes.
+/// Poll until `AXLE_NONE` before the next byte: a full decoder refuses it, with
+/// `AXLE_ERROR_FULL`.
 axle_result axle_ikeya_decoder_push(struct axle_ikeya_decoder *decoder, uint8_t byte);
 
 /// The next frame or gap in the bytes that are held; `AXLE_NONE` if there is none.
@@ -1784,7 +1811,8 @@ axle_result axle_ucp_decoder_decode(struct axle_ucp_decoder *decoder,
 
 /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
 ///
-/// Poll until `AXLE_NONE` before the next byte: a full decoder refuses bytes.
+/// Poll until `AXLE_NONE` before the next byte: a full decoder refuses it, with
+/// `AXLE_ERROR_FULL`.
 axle_result axle_ucp_decoder_push(struct axle_ucp_decoder *decoder, uint8_t byte);
 
 /// The next frame or gap in the bytes that are held; `AXLE_NONE` if there is none.
@@ -1902,6 +1930,9 @@ axle_result axle_ucp_host_drive(struct axle_ucp_host *host,
                                 uint64_t now_us);
 
 /// Tells the robot to stand still, again and again, until reports show that it does (ruling U16).
+///
+/// `get_robot_state` tells how far it is. After `AXLE_UCP_COAST_US`, a robot that is not seen to
+/// stand still may be moving.
 axle_result axle_ucp_host_stop(struct axle_ucp_host *host, uint64_t now_us);
 
 /// Asks the robot to start a calibration; an event tells (ruling U11).

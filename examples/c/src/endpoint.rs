@@ -31,7 +31,9 @@ pub struct axle_line_rules {
     /// Speed of the line, bit/s; 0 if it is not known.
     pub baud: u32,
     /// How long the port may go unread before the bytes in it count as old, microseconds;
-    /// `UINT32_MAX` if they never do. Hand in older ones by `handle_old_input`.
+    /// `UINT32_MAX` if they never do. Hand in older ones by `handle_old_input`. With 0, as of a
+    /// host, bytes count from when the port was last found empty: hand in all of them so, if
+    /// others came before or a frame was sent since.
     pub held_up_after_us: u32,
 }
 

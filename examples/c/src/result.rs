@@ -105,6 +105,8 @@ results! {
     AXLE_ERROR_FIELD = -41, c"not the header of a packet";
     /// The CRC does not match (ruling B1).
     AXLE_ERROR_CRC = -42, c"CRC does not match";
+    /// The decoder is full: poll its events until `AXLE_NONE`, then push the byte again.
+    AXLE_ERROR_FULL = -43, c"decoder is full";
 
     /// The node is not online: it has not answered yet, or no longer does (ruling I7).
     AXLE_ERROR_NOT_ONLINE = -60, c"node is not online";

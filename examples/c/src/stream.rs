@@ -8,7 +8,7 @@ use axlewire::{
 
 use crate::{
     memory::{Memory, Out, enter, enter_with, init, read},
-    result::{AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
+    result::{AXLE_ERROR_FULL, AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
 };
 
 /// A frame or a gap.
@@ -150,6 +150,7 @@ pub(crate) trait Decode {
     fn commit(&mut self, len: usize);
     fn idle(&mut self);
     fn pending(&self) -> usize;
+    fn received(&self) -> u64;
     fn counters(&self) -> Counters;
 }
 
@@ -235,6 +236,10 @@ where
         self.pending()
     }
 
+    fn received(&self) -> u64 {
+        self.received()
+    }
+
     fn counters(&self) -> Counters {
         self.counters()
     }
@@ -264,6 +269,10 @@ impl Decode for IkeyaDecoder {
 
     fn pending(&self) -> usize {
         of_framing!(self, it => it.pending())
+    }
+
+    fn received(&self) -> u64 {
+        of_framing!(self, it => it.received())
     }
 
     fn counters(&self) -> Counters {
@@ -341,9 +350,16 @@ fn push<M: Memory>(decoder: *mut M, byte: u8) -> axle_result
 where
     M::Value: Decode,
 {
-    match enter(decoder, |decoder| decoder.push(byte)) {
-        Ok(true) => AXLE_OK,
-        Ok(false) => AXLE_NONE,
+    let push = |decoder: &mut M::Value| {
+        let before = decoder.received();
+        let has_event = decoder.push(byte);
+        // A full decoder refuses the byte.
+        (has_event, decoder.received() != before)
+    };
+    match enter(decoder, push) {
+        Ok((_, false)) => AXLE_ERROR_FULL,
+        Ok((true, _)) => AXLE_OK,
+        Ok((false, _)) => AXLE_NONE,
         Err(error) => error,
     }
 }
@@ -406,7 +422,8 @@ macro_rules! decoder {
 
         /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
         ///
-        /// Poll until `AXLE_NONE` before the next byte: a full decoder refuses bytes.
+        /// Poll until `AXLE_NONE` before the next byte: a full decoder refuses it, with
+        /// `AXLE_ERROR_FULL`.
         #[unsafe(no_mangle)]
         pub extern "C" fn $push(decoder: *mut $decoder, byte: u8) -> axle_result {
             push(decoder, byte)

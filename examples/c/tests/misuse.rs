@@ -353,7 +353,7 @@ fn of_masters() -> (Functions<axle_ikeya_master>, Functions<axle_ikeya3_master>)
 
 fn of_slaves() -> (Functions<axle_ikeya_slave>, Functions<axle_ikeya3_slave>) {
     let mut one = slave!(axle_ikeya_slave_init AXLE_IKEYA_SLAVE_SIZE axle_ikeya_slave_poll_event
-        axle_ikeya_slave_command axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics
+        axle_ikeya_slave_get_command axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics
         axle_ikeya_slave_get_counters axle_ikeya_slave_set_velocity(1.0)
         axle_ikeya_slave_set_position(axle_ikeya_position::default()));
     one.1.extend(role!(axle_ikeya_slave_handle_input axle_ikeya_slave_handle_old_input
@@ -361,7 +361,7 @@ fn of_slaves() -> (Functions<axle_ikeya_slave>, Functions<axle_ikeya3_slave>) {
         axle_ikeya_slave_handle_transmit axle_ikeya_slave_is_outdated
         axle_ikeya_slave_next_deadline axle_ikeya_slave_get_line_rules));
     let mut three = slave!(axle_ikeya3_slave_init AXLE_IKEYA3_SLAVE_SIZE
-        axle_ikeya3_slave_poll_event axle_ikeya3_slave_command axle_ikeya3_slave_set_mode
+        axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command axle_ikeya3_slave_set_mode
         axle_ikeya3_slave_get_statistics axle_ikeya3_slave_get_counters
         axle_ikeya3_slave_set_velocity(speeds()) axle_ikeya3_slave_set_position(positions()));
     three.1.extend(role!(axle_ikeya3_slave_handle_input axle_ikeya3_slave_handle_old_input
@@ -653,4 +653,21 @@ fn numbers_that_mean_nothing_are_refused() {
     let result = axle_ikeya_master_init(master, AXLE_IKEYA_MASTER_SIZE, config, 0);
     assert_eq!(result, AXLE_ERROR_VALUE);
     assert_eq!(axle_ikeya_master_stop_all(master, 0), AXLE_OK, "a failed init changes nothing");
+}
+
+#[test]
+fn a_full_decoder_says_so_and_loses_nothing_that_it_had() {
+    let decoder = memory::<axle_ikeya_decoder>(0);
+    let size = AXLE_IKEYA_DECODER_SIZE;
+    assert_eq!(axle_ikeya_decoder_init(decoder, size, AXLE_IKEYA_TO_SLAVE), AXLE_OK);
+    let read = [0xAA, 0x01, 0xBE, 0xD0];
+    let pushed = read.iter().cycle().map(|byte| axle_ikeya_decoder_push(decoder, *byte));
+    let taken = pushed.take_while(|result| *result != AXLE_ERROR_FULL).take(1000).count();
+    assert!((8..100).contains(&taken), "{taken}");
+    // SAFETY: numbers and a pointer.
+    let mut event: axle_stream_event = unsafe { std::mem::zeroed() };
+    let frames = std::iter::from_fn(|| {
+        (axle_ikeya_decoder_poll(decoder, &mut event) == AXLE_OK).then_some(event.kind)
+    });
+    assert_eq!(frames.collect::<Vec<_>>(), vec![AXLE_STREAM_FRAME; taken / 4]);
 }

@@ -103,8 +103,7 @@ pub(crate) fn frames_of(
         return Err(failure);
     }
     let protocol = found.map(|(protocol, _)| protocol).or(chosen);
-    let protocol = protocol
-        .ok_or_else(|| Failure::Failed(format!("{} has no bytes", captures::named(paths))))?;
+    let protocol = protocol.ok_or_else(|| Failure::Failed(nothing(paths, interface)))?;
     let (taken, turned) = sheet.taken.unwrap_or_default();
     let mut commanded = taken.iter().filter_map(|taken| taken.commands);
     if let Some(node) = commanded.find(|node| turned.contains(node)) {
@@ -113,6 +112,15 @@ pub(crate) fn frames_of(
         return Err(Failure::Failed(line));
     }
     Ok((protocol, taken, walked))
+}
+
+/// Nothing was read of these captures.
+pub(crate) fn nothing(paths: &[PathBuf], interface: Option<usize>) -> String {
+    let named = captures::named(paths);
+    match interface {
+        Some(interface) => format!("{named} has nothing on interface {interface}"),
+        None => format!("{named} has no bytes"),
+    }
 }
 
 /// Finds out the protocol of raw bytes, and says how sure it is.

@@ -214,8 +214,14 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 }),
                 None => packet.interface,
             };
-            if self.choice.interface.is_some_and(|wanted| wanted != interface) {
-                continue;
+            match self.choice.interface {
+                Some(wanted) if wanted == packet.interface && wanted != interface => {
+                    return Err(Failure::Failed(format!(
+                        "interface {wanted} is one line with interface {interface}: choose that"
+                    )));
+                }
+                Some(wanted) if wanted != interface => continue,
+                _ => {}
             }
             let line = match self.lines.entry(interface) {
                 Entry::Occupied(known) => known.into_mut(),

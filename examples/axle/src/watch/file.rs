@@ -19,6 +19,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     sheet.wanted = args.count;
     // The times of a capture, microseconds since the first; raw bytes have none.
     let (mut first, mut last) = (None, 0);
+    let mut is_ambiguous = false;
     let choice = Choice {
         protocol: args.protocol,
         interface: args.interface,
@@ -28,6 +29,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let walked = decode::walk(&mut input, choice, &mut sheet, |next, sheet| {
         let line = (next.protocol, next.interface);
         if *found.get_or_insert(line) != line {
+            is_ambiguous = true;
             let line = "the capture has more than one line: choose one with --interface";
             return Err(Failure::Failed(line.to_owned()));
         }
@@ -45,7 +47,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let is_empty = counters.received == 0;
     let broken = walked.broken.or(walked.cut);
     match broken {
-        Some(failure) if is_empty => return Err(failure),
+        Some(failure) if is_empty || is_ambiguous => return Err(failure),
+        None if is_empty && args.interface.is_some() => {
+            return Err(Failure::Failed(decode::nothing(&args.from.files, args.interface)));
+        }
         _ => {}
     }
     // Without a frame, the table of every protocol is the same.

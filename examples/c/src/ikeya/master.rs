@@ -535,8 +535,8 @@ macro_rules! master {
     ($master:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident
         $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident
         $statistics:ident $node_statistics:ident $counters:ident) => {
-        /// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`. Never
-        /// call it during another call with the same object.
+        /// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`.
+        /// Never call it during another call with the same object.
         #[unsafe(no_mangle)]
         pub extern "C" fn $init(
             master: *mut $master,
@@ -564,6 +564,9 @@ macro_rules! master {
 
         /// Stops a node: sent before anything else, and repeated until the motor is seen to be at
         /// rest, or until a set-point, which is refused before the stop is confirmed (I12).
+        ///
+        /// `get_node` tells how far it is. After `stop_bound_us`, `coast_us` and `read_bound_us`, a
+        /// node that is not seen to stand still may be moving.
         #[unsafe(no_mangle)]
         pub extern "C" fn $stop(master: *mut $master, node: u8, now_us: u64) -> axle_result {
             of_node(master, node, |master, node| {

@@ -276,7 +276,7 @@ macro_rules! slave {
 }
 
 slave!(axle_ikeya_slave:
-    axle_ikeya_slave_init axle_ikeya_slave_poll_event axle_ikeya_slave_command
+    axle_ikeya_slave_init axle_ikeya_slave_poll_event axle_ikeya_slave_get_command
     axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics axle_ikeya_slave_get_counters);
 endpoint!(axle_ikeya_slave:
     axle_ikeya_slave_handle_input axle_ikeya_slave_handle_old_input
@@ -284,7 +284,7 @@ endpoint!(axle_ikeya_slave:
     axle_ikeya_slave_handle_transmit axle_ikeya_slave_is_outdated
     axle_ikeya_slave_next_deadline axle_ikeya_slave_get_line_rules);
 slave!(axle_ikeya3_slave:
-    axle_ikeya3_slave_init axle_ikeya3_slave_poll_event axle_ikeya3_slave_command
+    axle_ikeya3_slave_init axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command
     axle_ikeya3_slave_set_mode axle_ikeya3_slave_get_statistics axle_ikeya3_slave_get_counters);
 endpoint!(axle_ikeya3_slave:
     axle_ikeya3_slave_handle_input axle_ikeya3_slave_handle_old_input

@@ -541,7 +541,16 @@ pub extern "C" fn axle_ucp_host_drive(
     drive(host, motor.map(|motor| motor.with_front_led(command.lamp != 0)), now_us)
 }
 
+/// Time after a stop in which a rover is seen to stand still, microseconds: 2 s to coast, and one
+/// more until the average that it reports shows it.
+pub const AXLE_UCP_COAST_US: u32 = 3_000_000;
+
+const _: () = assert!(AXLE_UCP_COAST_US == axlewire::ucp::host::COAST.as_micros());
+
 /// Tells the robot to stand still, again and again, until reports show that it does (ruling U16).
+///
+/// `get_robot_state` tells how far it is. After `AXLE_UCP_COAST_US`, a robot that is not seen to
+/// stand still may be moving.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_stop(host: *mut axle_ucp_host, now_us: u64) -> axle_result {
     of(enter(host, |host| host.stop(at(now_us))))

@@ -207,12 +207,12 @@ master!(axle_ikeya3_master:
     |it, node, rps: [f32; 3], now| axle_ikeya3_master_set_velocity(it, node, rps.as_ptr(), now),
     |it, node, to: Positions, now| axle_ikeya3_master_set_position(it, node, to.as_ptr(), now));
 slave!(axle_ikeya_slave:
-    axle_ikeya_slave_init axle_ikeya_slave_poll_event axle_ikeya_slave_command
+    axle_ikeya_slave_init axle_ikeya_slave_poll_event axle_ikeya_slave_get_command
     axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics axle_ikeya_slave_get_counters,
     |it, rps: [f32; 3]| axle_ikeya_slave_set_velocity(it, rps[0]),
     |it, at: Positions| axle_ikeya_slave_set_position(it, at[0]));
 slave!(axle_ikeya3_slave:
-    axle_ikeya3_slave_init axle_ikeya3_slave_poll_event axle_ikeya3_slave_command
+    axle_ikeya3_slave_init axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command
     axle_ikeya3_slave_set_mode axle_ikeya3_slave_get_statistics axle_ikeya3_slave_get_counters,
     |it, rps: [f32; 3]| axle_ikeya3_slave_set_velocity(it, rps.as_ptr()),
     |it, at: Positions| axle_ikeya3_slave_set_position(it, at.as_ptr()));
