@@ -74,8 +74,8 @@ static void usart1_interrupt(void) {
 
 void reset(void) {
     const uint32_t *from = data_from;
-    for (uint32_t *to = data_begin; to < data_end;) *to++ = *from++;
-    for (uint32_t *to = bss_begin; to < bss_end;) *to++ = 0;
+    for (uint32_t *to = data_begin; (uintptr_t)to < (uintptr_t)data_end;) *to++ = *from++;
+    for (uint32_t *to = bss_begin; (uintptr_t)to < (uintptr_t)bss_end;) *to++ = 0;
     CPACR |= 0xFu << 20; /* the library uses the FPU */
     main();
     for (;;) {}

@@ -224,7 +224,7 @@ namespace detail {
     AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
 #define AXLE_SLAVE(c)                                                                              \
     AXLE_ROLE(c, axle_ikeya_slave)                                                                 \
-    AXLE_CALL(c, command) AXLE_CALL(c, set_mode)                                                   \
+    AXLE_CALL(c, get_command) AXLE_CALL(c, set_mode)                                                   \
     AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
 struct IkeyaDecoderCalls { AXLE_DECODER(axle_ikeya_decoder) };
 struct UcpDecoderCalls { AXLE_DECODER(axle_ucp_decoder) };
@@ -373,7 +373,7 @@ class Slave : public Role<C> {
         : Role<C>(node, mode, &config, now) {}
     /// Absent: the motor must be at rest.
     std::optional<Motion> command(Time now) const {
-        return maybe<Motion>(C::command, object(), now);
+        return maybe<Motion>(C::get_command, object(), now);
     }
     Status set_mode(axle_ikeya_mode mode) { return call(C::set_mode, object(), mode); }
     /// As measured, turns per second.

@@ -84,6 +84,7 @@ pub(crate) fn init<M: Memory>(
 }
 
 /// Calls a function with the object in the memory, and keeps other calls out meanwhile.
+#[inline]
 pub(crate) fn enter<M: Memory, R>(
     memory: *const M,
     function: impl FnOnce(&mut M::Value) -> R,
@@ -111,6 +112,7 @@ pub(crate) fn enter<M: Memory, R>(
 }
 
 /// The same with bytes of the caller, which must not be in the memory of the object.
+#[inline]
 pub(crate) fn enter_with<M: Memory, R>(
     memory: *const M,
     data: *const u8,
@@ -133,12 +135,14 @@ const fn busy<M: Memory>() -> u32 {
     !M::MAGIC
 }
 
+#[inline]
 fn checked<M: Memory>(memory: *mut M) -> Result<*mut Object<M::Value>, axle_result> {
     const { assert!(size_of::<Object<M::Value>>() <= size_of::<M>()) };
     aligned(memory)?;
     Ok(memory.cast())
 }
 
+#[inline]
 fn aligned<T>(pointer: *const T) -> Result<(), axle_result> {
     if pointer.is_null() {
         Err(AXLE_ERROR_NULL)
@@ -150,6 +154,7 @@ fn aligned<T>(pointer: *const T) -> Result<(), axle_result> {
 }
 
 /// Bytes of the caller. None may be null.
+#[inline]
 pub(crate) fn bytes<'a>(data: *const u8, length: usize) -> Result<&'a [u8], axle_result> {
     if length == 0 {
         return Ok(&[]);
@@ -178,6 +183,7 @@ pub(crate) fn bytes_mut<'a>(data: *mut u8, length: usize) -> Result<&'a mut [u8]
 }
 
 /// A value of the caller, of which every bit pattern is valid.
+#[inline]
 pub(crate) fn read<T: Copy + Plain>(from: *const T) -> Result<T, axle_result> {
     aligned(from)?;
     // SAFETY: aligned and not null; the caller promises that it points to such a value, and all
@@ -206,11 +212,13 @@ plain!(u8, usize, u64, f32, *const u8);
 pub(crate) struct Out<T>(*mut T);
 
 impl<T> Out<T> {
+    #[inline]
     pub(crate) fn new(to: *mut T) -> Result<Self, axle_result> {
         aligned(to)?;
         Ok(Self(to))
     }
 
+    #[inline]
     pub(crate) fn write(self, value: T) -> axle_result {
         // SAFETY: aligned and not null; the caller promises that a value can be written there.
         unsafe { self.0.write(value) };

@@ -178,6 +178,7 @@ frames!(
     &ucp::Frame
 );
 
+#[inline]
 fn event<F: Bytes>(event: Event<F>) -> axle_stream_event {
     match event {
         Event::Frame(frame) => {
@@ -216,30 +217,37 @@ where
         self.decode(input).map(event)
     }
 
+    #[inline]
     fn push(&mut self, byte: u8) -> bool {
         self.push(byte)
     }
 
+    #[inline]
     fn spare(&mut self) -> &mut [u8] {
         self.spare()
     }
 
+    #[inline]
     fn commit(&mut self, len: usize) {
         self.commit(len);
     }
 
+    #[inline]
     fn idle(&mut self) {
         self.idle();
     }
 
+    #[inline]
     fn pending(&self) -> usize {
         self.pending()
     }
 
+    #[inline]
     fn received(&self) -> u64 {
         self.received()
     }
 
+    #[inline]
     fn counters(&self) -> Counters {
         self.counters()
     }
@@ -251,30 +259,37 @@ impl Decode for IkeyaDecoder {
         of_framing!(self, it => Decode::decode(it, input))
     }
 
+    #[inline]
     fn push(&mut self, byte: u8) -> bool {
         of_framing!(self, it => it.push(byte))
     }
 
+    #[inline]
     fn spare(&mut self) -> &mut [u8] {
         of_framing!(self, it => it.spare())
     }
 
+    #[inline]
     fn commit(&mut self, len: usize) {
         of_framing!(self, it => it.commit(len));
     }
 
+    #[inline]
     fn idle(&mut self) {
         of_framing!(self, it => it.idle());
     }
 
+    #[inline]
     fn pending(&self) -> usize {
         of_framing!(self, it => it.pending())
     }
 
+    #[inline]
     fn received(&self) -> u64 {
         of_framing!(self, it => it.received())
     }
 
+    #[inline]
     fn counters(&self) -> Counters {
         of_framing!(self, it => it.counters())
     }

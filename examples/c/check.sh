@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Runs the proof of this package: the header, the tests beside Rust, every recorded frame in C, the
+# programs by gcc and clang on simulated lines, and the node in QEMU. Some ten minutes.
+#
+# Needs cbindgen, gcc, clang, valgrind, cppcheck, doxygen, cmake, pkg-config, python3 and QEMU.
+set -euo pipefail
+cd "$(dirname "$0")"
+target=${CARGO_TARGET_DIR:-$PWD/../../target}
+./header.sh --check
+cargo test --quiet -p axlewire-c
+./check_vectors.sh
+cppcheck --quiet --error-exitcode=1 --enable=warning,performance,portability \
+    -Iinclude programs firmware tests/vectors.c
+(cat <<'END'
+INPUT = include/axlewire.h
+GENERATE_LATEX = NO
+GENERATE_HTML = NO
+GENERATE_XML = YES
+QUIET = YES
+WARN_AS_ERROR = FAIL_ON_WARNINGS
+END
+echo "OUTPUT_DIRECTORY = $target/doxygen") | doxygen -
+./check_programs.sh
+cargo build --quiet --release -p axle
+echo "== a node in QEMU"
+./firmware/run.sh "$target/release/axle" spin -p PORT --node 1 --rps 2 --for 2 | tee "$target/c-node.log"
+grep -q '2.00 rps$' "$target/c-node.log"
+grep -q 'stopped and confirmed' "$target/c-node.log"
