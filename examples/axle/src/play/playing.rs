@@ -130,8 +130,8 @@ struct Playing<'a, V> {
     /// What has become of the frames. Those that did not leave whole are not sent again: they
     /// would come late.
     sum: Summary,
-    /// The frame that was taken last, until it has left: when it was due.
-    taken: Option<(Due, Instant)>,
+    /// The frame that was taken last, until it has left: when it was due, and taken.
+    taken: Option<(Due, Instant, Instant)>,
     /// With the frames that are left.
     plan: Plan<'a>,
 }
@@ -156,11 +156,11 @@ impl<V: Voice> Playing<'_, V> {
             // First: what was due during an absence is out of date.
             attendance.check(now)?;
             self.voice.check()?;
-            if let Some((due, at)) = self.taken.take_if(|_| self.voice.is_free()) {
+            if let Some((due, at, _)) = self.taken.take_if(|_| self.voice.is_free()) {
                 self.sum.count_sent(now - at);
                 (end, free_at) = (after(now, self.plan.linger_us), now + self.line_time(&due));
             }
-            if self.taken.as_ref().is_some_and(|(_, at)| now - *at >= PATIENCE) {
+            if self.taken.as_ref().is_some_and(|(.., at)| now - *at >= PATIENCE) {
                 break;
             }
             let at = match self.plan.frames.front() {
@@ -172,25 +172,24 @@ impl<V: Voice> Playing<'_, V> {
             if now >= at || self.taken.is_some() {
                 until = now + WAIT_PERIOD;
             }
-            if now >= at {
-                if self.taken.is_none()
-                    && self.voice.is_free()
-                    && let Some(due) = self.plan.frames.pop_front()
-                {
-                    let at = free_in_time.max(after(start, due.after_us));
-                    free_in_time = at + self.line_time(&due);
-                    match self.voice.give(&due, now)? {
-                        Given::Sent => {
-                            self.sum.count_sent(now - at);
-                            end = after(now, self.plan.linger_us);
-                            free_at = now + self.line_time(&due);
-                        }
-                        Given::Taken => self.taken = Some((due, at)),
-                        Given::Lost => self.sum.lost += 1,
-                        Given::LeftOut => self.sum.left_out += 1,
+            if now >= at
+                && self.taken.is_none()
+                && self.voice.is_free()
+                && let Some(due) = self.plan.frames.pop_front()
+            {
+                let at = free_in_time.max(after(start, due.after_us));
+                free_in_time = at + self.line_time(&due);
+                match self.voice.give(&due, now)? {
+                    Given::Sent => {
+                        self.sum.count_sent(now - at);
+                        end = after(now, self.plan.linger_us);
+                        free_at = now + self.line_time(&due);
                     }
-                    until = now;
+                    Given::Taken => self.taken = Some((due, at, now)),
+                    Given::Lost => self.sum.lost += 1,
+                    Given::LeftOut => self.sum.left_out += 1,
                 }
+                until = now;
             }
             self.voice.round(until)?;
             if let Some(lines) = self.lister.lines() {
