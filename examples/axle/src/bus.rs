@@ -398,6 +398,20 @@ impl<B: Boards> Bus<B> {
     /// If they are not all still, a failure of the port is returned. The wait is bounded, and no
     /// signal ends it early.
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
+        self.stop_while(nodes, |_| true)
+    }
+
+    /// The same, but gives up at once if an answer comes too late, and could be waited for: from
+    /// then on, an answer may be that to an older READ.
+    pub(crate) fn stop_in_time(&mut self, nodes: NodeSet) -> Result<(), Failure> {
+        self.stop_while(nodes, |bus| !bus.could_wait_longer())
+    }
+
+    fn stop_while(
+        &mut self,
+        nodes: NodeSet,
+        goes_on: impl Fn(&Self) -> bool,
+    ) -> Result<(), Failure> {
         let (now, begin) = (self.now(), self.session.awake());
         nodes.iter().for_each(|node| self.master_mut().stop(node, now));
         let patience = span(self.master().stop_bound()).max(STOP_PATIENCE);
@@ -407,6 +421,9 @@ impl<B: Boards> Bus<B> {
             && time(self) < patience
             && (time(self) < SILENCE || nodes.iter().any(|node| self.is_unasked(node)))
         {
+            if !goes_on(self) {
+                return Ok(());
+            }
             if self.look().is_err() {
                 clock::sleep(FAILURE_PAUSE);
             }

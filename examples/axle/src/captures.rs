@@ -7,6 +7,7 @@ use std::{
 };
 
 use crate::{
+    decode::LATEST_US,
     failure::Failure,
     input::{self, Form, Input},
     pcapng::Reader,
@@ -106,7 +107,7 @@ fn first_time(path: &Path, form: Form) -> Result<u64, Failure> {
     // Damage is told when the file is read.
     let mut reader = Reader::new(&mut input);
     while let Ok(Some(packet)) = reader.next() {
-        if let Some(micros) = packet.micros {
+        if let Some(micros) = packet.micros.filter(|micros| *micros <= LATEST_US) {
             return Ok(micros);
         }
     }

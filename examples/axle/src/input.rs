@@ -56,6 +56,8 @@ pub(crate) struct Input {
     chunk: Box<[u8]>,
     /// Bytes at the front that were read ahead, to look at them first.
     ahead: Vec<u8>,
+    /// Why no more could be read ahead.
+    failure: Option<Failure>,
     /// The first bytes, up to the length that was asked for.
     first: Vec<u8>,
     first_len: usize,
@@ -151,6 +153,7 @@ impl Input {
             reader,
             chunk,
             ahead,
+            failure: None,
             first,
             first_len,
             file,
@@ -236,7 +239,8 @@ impl Input {
             return Err(Failure::Usage("the capture is hex text: use --hex".to_owned()));
         }
         if let Some((_, kind)) = FOREIGN.iter().find(|(magic, _)| front.starts_with(magic)) {
-            let line = format!("the capture is {kind}: unpack or convert it first");
+            let named = self.path.as_ref().map_or("the capture".to_owned(), |it| format!("{it:?}"));
+            let line = format!("{named} is {kind}: unpack or convert it first");
             return Err(Failure::Failed(line));
         }
         if is_telnet(front) {
@@ -250,6 +254,8 @@ impl Input {
 
     /// Reads through another reader from now on.
     fn behind(mut self, with: impl FnOnce(Box<dyn Read>) -> Box<dyn Read>) -> Self {
+        // Its reader will fail again.
+        self.failure = None;
         let ahead = io::Cursor::new(mem::take(&mut self.ahead));
         self.reader = with(Box::new(ahead.chain(self.reader)));
         (self.is_plain, self.progress) = (false, None);
@@ -265,14 +271,21 @@ impl Input {
     ) -> Result<&[u8], Failure> {
         let mut ahead = mem::take(&mut self.ahead);
         while ahead.len() < len && !is_enough(&ahead) {
-            let bytes = self.read()?;
-            if bytes.is_empty() {
-                break;
+            match self.read() {
+                Ok([]) => break,
+                Ok(bytes) => ahead.extend_from_slice(bytes),
+                // What is in front of a fault is read; it is told behind that.
+                Err(failure) => {
+                    self.failure = Some(failure);
+                    break;
+                }
             }
-            ahead.extend_from_slice(bytes);
         }
         self.ahead = ahead;
-        Ok(&self.ahead)
+        match self.failure.take_if(|_| self.ahead.is_empty()) {
+            Some(failure) => Err(failure),
+            None => Ok(&self.ahead),
+        }
     }
 
     /// The next bytes; empty at the end.
@@ -281,6 +294,9 @@ impl Input {
             self.chunk = mem::take(&mut self.ahead).into_boxed_slice();
             self.keep(self.chunk.len());
             return Ok(&self.chunk);
+        }
+        if let Some(failure) = self.failure.take() {
+            return Err(failure);
         }
         if self.chunk.len() < CHUNK_LEN {
             self.chunk = vec![0; CHUNK_LEN].into_boxed_slice();

@@ -7,7 +7,7 @@ use std::{collections::VecDeque, path::PathBuf};
 use crate::{
     args::{self, Protocol},
     bus,
-    decode::{self, Taken, Walked},
+    decode::{self, SHORT_STEP_US, Taken, Walked},
     failure::Failure,
     help::MOTION_HELP,
     input::Form,
@@ -133,7 +133,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
     let (protocol, mut taken, walked) =
         decode::frames_of(&args.files, args.form, args.protocol, args.interface)?;
-    if walked.times_back == 0 {
+    if !walked.is_set_back {
         // A frame behind a false start comes late, and files of one line may overlap.
         taken = in_order_of_time(taken);
     }
@@ -203,12 +203,22 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
     Ok((plan, walked))
 }
 
-/// Frames without a time stay behind the one before them.
+/// Those of one direction stay in their order, and frames without a time behind the one before.
 fn in_order_of_time(taken: Vec<Taken>) -> Vec<Taken> {
-    let mut last = 0;
+    let mut latest = [0; 3];
     let timed = taken.into_iter().map(|taken| {
-        last = taken.micros.unwrap_or(last);
-        (last, taken)
+        let latest = match taken.direction {
+            Some(Direction::Out) => &mut latest[0],
+            Some(Direction::In) => &mut latest[1],
+            None => &mut latest[2],
+        };
+        // A file of later times comes later, and none goes back by more than a moment.
+        *latest = match taken.micros {
+            Some(micros) if micros + SHORT_STEP_US < *latest => micros,
+            Some(micros) => micros.max(*latest),
+            None => *latest,
+        };
+        (*latest, taken)
     });
     let mut timed: Vec<_> = timed.collect();
     timed.sort_by_key(|(micros, _)| *micros);
@@ -220,8 +230,9 @@ fn in_order_of_time(taken: Vec<Taken>) -> Vec<Taken> {
 struct Echoes(VecDeque<(Option<u64>, Box<[u8]>)>);
 
 impl Echoes {
-    /// Longest time from a frame to its echo, microseconds.
+    /// Longest time from a frame to its echo, microseconds, and most frames meanwhile.
     const LATEST_US: u64 = 1_000_000;
+    const MOST: usize = 64;
 
     /// Whether this is the echo of a frame before it, which is then over.
     fn has(&mut self, direction: Option<Direction>, micros: Option<u64>, bytes: &[u8]) -> bool {
@@ -234,6 +245,9 @@ impl Echoes {
         }
         if direction == Some(Direction::Out) {
             self.0.push_back((micros, bytes.into()));
+            if self.0.len() > Self::MOST {
+                self.0.pop_front();
+            }
             return false;
         }
         let place = self.0.iter().position(|(_, sent)| **sent == *bytes);

@@ -112,12 +112,14 @@ fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
         bus.listen(&signals)?;
     }
     let (mut needs, mut times) = (None, Vec::new());
+    let (known, too_short) = (bus.those_heard().len(), bus.master().config().reply_timeout);
     if args.bus.may_wait_longer() && bus.could_wait_longer() {
         bus.begin_patiently(NodeSet::ALL, 2);
         discover(&mut bus, &signals)?;
-        needs = bus.needed_patience();
+        needs = bus.needed_patience().filter(|it| it.config().reply_timeout > too_short);
     }
-    let found = still_there(&bus);
+    // One of another speed or protocol was heard, too.
+    let found = still_there(&bus).max(if still_there(&bus) > 0 { known } else { 0 });
     if args.measure && found > 0 {
         times = measure::measure(&mut bus, &signals)?;
         needs = measure::proposal(&times);
@@ -225,7 +227,7 @@ fn print_table<B: Boards>(
         }
         (0, _) if are(Bus::late) => writeln!(
             out,
-            "No node answers in time on {path:?}, but later: use a longer --reply-timeout, or --measure."
+            "No node answers in time on {path:?}, but later: use a longer --reply-timeout."
         ),
         (0, _) if are(Bus::early) => writeln!(
             out,

@@ -236,9 +236,11 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
-    let failure = bus.stop(nodes).err();
+    let is_patient = !args.bus.may_wait_longer();
+    let failure = if is_patient { bus.stop(nodes) } else { bus.stop_in_time(nodes) }.err();
+    let too_short = bus.master().config().reply_timeout;
     let mut stopped = Stopped { path: bus.path().to_owned(), failure, ..Stopped::default() };
-    if args.bus.may_wait_longer() && bus.could_wait_longer() {
+    if !is_patient && bus.could_wait_longer() {
         stopped.failure = None;
         let (known, first) = (bus.those_heard(), bus.may_be_there());
         let rest = nodes.iter().filter(|node| !first.contains(*node)).collect();
@@ -250,7 +252,7 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
             stopped.judge_each(args, &bus, nodes, known);
             needs = needs.max(bus.needed_patience());
         }
-        if let Some(patience) = needs {
+        if let Some(patience) = needs.filter(|it| it.config().reply_timeout > too_short) {
             eprintln!(
                 "axle: answers come late: others need --reply-timeout {patience} on this line"
             );

@@ -386,6 +386,17 @@ fn one_line_of_several_can_be_chosen() {
 }
 
 #[test]
+fn frames_in_front_of_a_fault_in_hex_text_are_listed_whether_or_not_the_protocol_is_named() {
+    let text: String = pings().concat().iter().map(|byte| format!("{byte:02x}")).collect();
+    for options in [&["decode", "--hex", "--json"][..], &["decode", "--hex", "-P", "ucp", "--json"]]
+    {
+        let (rows, code, error) = outcome(run(options, format!("{text} # end").as_bytes()));
+        assert_eq!((rows.matches("\"ping\"").count(), code), (3, Some(1)), "{error}");
+        assert!(error.contains("line 1 is not hex text"), "{error}");
+    }
+}
+
+#[test]
 fn times_before_1970_are_impossible_ones() {
     let mut file = PcapNg(PcapNg::new(147, &[]).0[..28].to_vec());
     let offset = (-2_i64).to_le_bytes();

@@ -39,6 +39,8 @@ pub(crate) struct Walked {
     pub(crate) account: Counters,
     /// Number of packets with a time before that of the packet in front of them.
     pub(crate) times_back: u64,
+    /// Whether one of them was much earlier: the clock was set.
+    pub(crate) is_set_back: bool,
     /// The modes of the nodes at the end of the last line.
     pub(crate) modes: Modes,
     /// Packets whose time no clock can have shown, which count as packets without one: how many,
@@ -54,7 +56,10 @@ pub(crate) struct Walked {
 
 /// The last time that a packet can have, microseconds since 1970: in April 2262. Every form of
 /// export can hold it.
-const LATEST_US: u64 = i64::MAX as u64 / 1000;
+pub(crate) const LATEST_US: u64 = i64::MAX as u64 / 1000;
+
+/// Packets of two directions may be in the wrong order by this much, microseconds.
+pub(crate) const SHORT_STEP_US: u64 = 10_000;
 
 impl Walked {
     /// The time of the packet with this number, if it can be one.
@@ -249,6 +254,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
             let micros = self.walked.time(packet.micros, self.number);
             if let Some(micros) = micros {
                 self.walked.times_back += u64::from(micros < self.latest);
+                self.walked.is_set_back |= micros + SHORT_STEP_US < self.latest;
                 self.latest = micros;
             }
             let (protocol, interface) = (line.protocol, Some(interface));
@@ -272,6 +278,10 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
             return Err(Failure::Usage(line.to_owned()));
         };
         self.choice.permits(protocol)?;
+        if self.choice.interface.is_some() {
+            let line = "--interface is for captures with interfaces: raw bytes are one line";
+            return Err(Failure::Usage(line.to_owned()));
+        }
         let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None, None));
         loop {
             let bytes = match input.read() {

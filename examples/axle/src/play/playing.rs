@@ -178,8 +178,11 @@ impl<V: Voice> Playing<'_, V> {
                 && let Some(due) = self.plan.frames.pop_front()
             {
                 let at = free_in_time.max(after(start, due.after_us));
-                free_in_time = at + self.line_time(&due);
-                match self.voice.give(&due, now)? {
+                let given = self.voice.give(&due, now)?;
+                if given != Given::LeftOut {
+                    free_in_time = at + self.line_time(&due);
+                }
+                match given {
                     Given::Sent => {
                         self.sum.count_sent(now - at);
                         end = after(now, self.plan.linger_us);

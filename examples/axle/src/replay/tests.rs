@@ -193,6 +193,25 @@ fn only_the_echo_of_what_was_sent_is_left_out() {
 }
 
 #[test]
+fn packets_of_two_directions_may_be_in_the_wrong_order_by_a_moment() {
+    let (read, write) = (read(), write());
+    let (sent, heard) = (Some(Direction::Out), Some(Direction::In));
+    // As two files that overlap: the second begins at 500 ms.
+    let packets: [(u64, Option<Direction>, &[u8]); 5] = [
+        (0, sent, &read),
+        (11, heard, &answer()),
+        (10, sent, &read),
+        (1000, sent, &write),
+        (500, sent, &read),
+    ];
+    let set_back = frames(&capture("set-back", &packets), "--move").unwrap();
+    assert_eq!(set_back.last().unwrap().1, read[..4], "the clock was set");
+    let found = frames(&capture("moment", &packets[..4]), "--move").unwrap();
+    let times: Vec<_> = found.iter().map(|(micros, _)| micros / 1000).collect();
+    assert_eq!(times, [0, 10, 1000]);
+}
+
+#[test]
 fn a_frame_that_a_stray_byte_holds_back_is_sent_at_its_time() {
     let (read, answer) = (read(), answer());
     let (sent, heard) = (Some(Direction::Out), Some(Direction::In));
