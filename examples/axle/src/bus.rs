@@ -198,10 +198,21 @@ impl<B: Boards> Bus<B> {
     ///
     /// The line is left alone before: an old answer must not count as a new one.
     pub(crate) fn begin_patiently(&mut self, nodes: NodeSet, attempts: u8) {
+        clock::sleep(span(SLOW_TIMEOUT));
+        self.begin_now(nodes, attempts);
+    }
+
+    /// Leaves the line alone for half a second, and then takes in what has come meanwhile.
+    pub(crate) fn leave_alone(&mut self) -> Result<(), Failure> {
+        self.begin_patiently(NodeSet::NONE, u8::MAX);
+        self.look()
+    }
+
+    /// The same as [`begin_patiently`](Self::begin_patiently), for a line that was left alone.
+    pub(crate) fn begin_now(&mut self, nodes: NodeSet, attempts: u8) {
         let mut config = *self.master().config();
         (config.nodes, config.attempts) = (nodes, config.attempts.min(attempts));
         config = patience::with_reply_timeout(config, SLOW_TIMEOUT);
-        clock::sleep(span(SLOW_TIMEOUT));
         self.session.begin_anew(|now| Master::for_board(config, now));
     }
 
@@ -417,8 +428,12 @@ impl<B: Boards> Bus<B> {
         let patience = span(self.master().stop_bound()).max(STOP_PATIENCE);
         let coast = span(self.master().config().coast);
         let time = |bus: &Self| bus.session.awake() - begin;
+        // Until each id has been asked as often as it is to be, if the port works.
+        let config = self.master().config();
+        let reads = u32::from(config.attempts) * nodes.len() as u32;
+        let asking = patience.max(span(config.reply_timeout) * (reads + 1));
         while self.heard(nodes) != nodes
-            && time(self) < patience
+            && time(self) < asking
             && (time(self) < SILENCE || nodes.iter().any(|node| self.is_unasked(node)))
         {
             if !goes_on(self) {

@@ -7,10 +7,9 @@ use std::{
 };
 
 use crate::{
-    decode::LATEST_US,
     failure::Failure,
     input::{self, Form, Input},
-    pcapng::Reader,
+    pcapng::{LATEST_US, Reader},
 };
 
 /// What a folder may hold besides captures.

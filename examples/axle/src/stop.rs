@@ -1,11 +1,15 @@
 //! `axle stop`: stops whatever answers on a line.
 
-use std::fmt;
+use std::{cell::Cell, fmt, rc::Rc};
 
-use axlewire::ikeya::{
-    NodeId,
-    board::{OneMotor, ThreeMotors},
-    master::NodeSet,
+use axlewire::{
+    ikeya::{
+        self, NodeId,
+        board::{OneMotor, ThreeMotors},
+        master::NodeSet,
+        three,
+    },
+    stream::Event as Found,
 };
 use serde::Serialize;
 
@@ -16,6 +20,7 @@ use crate::{
     failure::Failure,
     help::MOTION_HELP,
     line::{Line, SharedRecording},
+    pcapng::Direction,
     report::{Form, Outcome},
     rover::Rover,
     signals::Signals,
@@ -229,11 +234,49 @@ impl Stopped {
     }
 }
 
+/// READs of an id on a slow line until it counts as silent.
+const PATIENT_ATTEMPTS: u8 = 3;
+
+/// Tells the ids of the whole answers in a stream.
+type Ids = Box<dyn FnMut(&[u8], &mut NodeSet)>;
+
+macro_rules! ids_of {
+    ($decoder:expr) => {{
+        let mut decoder = $decoder;
+        Box::new(move |mut bytes, nodes| {
+            while let Some(event) = decoder.decode(&mut bytes) {
+                if let Found::Frame(answer) = event {
+                    nodes.insert(answer.id());
+                }
+            }
+        })
+    }};
+}
+
+/// The ids of all whole answers on this line, whenever they come.
+fn heard_on(line: Line, protocol: Protocol) -> (Rc<Cell<NodeSet>>, Line) {
+    let mut ids: Ids = match protocol {
+        Protocol::Ikeya3 => ids_of!(three::Decoder::<three::ToMaster>::new()),
+        _ => ids_of!(ikeya::Decoder::<ikeya::ToMaster>::new()),
+    };
+    let heard = Rc::new(Cell::new(NodeSet::NONE));
+    let tapped = Rc::clone(&heard);
+    let line = line.tapped(move |direction, bytes| {
+        if direction == Direction::In {
+            let mut nodes = tapped.get();
+            ids(bytes, &mut nodes);
+            tapped.set(nodes);
+        }
+    });
+    (heard, line)
+}
+
 fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Failure> {
     let mut config = args.bus.config();
     config.nodes = args.node.map_or(NodeSet::ALL, NodeSet::from);
     let nodes = config.nodes;
     let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
+    let (heard, line) = heard_on(line, B::PROTOCOL);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
     let is_patient = !args.bus.may_wait_longer();
@@ -242,12 +285,21 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let mut stopped = Stopped { path: bus.path().to_owned(), failure, ..Stopped::default() };
     if !is_patient && bus.could_wait_longer() {
         stopped.failure = None;
-        let (known, first) = (bus.those_heard(), bus.may_be_there());
+        let damaged = bus.may_be_there();
+        // Answers to what was asked in vain are no answers, but tell who is there.
+        let failure = bus.leave_alone().err();
+        stopped.failure = stopped.failure.or(failure);
+        let known = heard.get();
+        let first = known | damaged;
         let rest = nodes.iter().filter(|node| !first.contains(*node)).collect();
         let mut needs = None;
         // First those whose motors are known to be there.
         for nodes in [first, rest] {
-            bus.begin_patiently(nodes, if nodes == first { 3 } else { 2 });
+            if nodes == first {
+                bus.begin_now(nodes, PATIENT_ATTEMPTS);
+            } else {
+                bus.begin_patiently(nodes, PATIENT_ATTEMPTS);
+            }
             stopped.failure = bus.stop(nodes).err().or(stopped.failure);
             stopped.judge_each(args, &bus, nodes, known);
             needs = needs.max(bus.needed_patience());

@@ -35,7 +35,7 @@ use framing::for_framing;
 use printer::Printer;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
-pub(crate) use walk::{LATEST_US, Next, SHORT_STEP_US, Walked, walk};
+pub(crate) use walk::{Next, SHORT_STEP_US, Walked, walk};
 pub(crate) use whole::{Chosen, choose, walk_into};
 
 /// Maximum number of threads: each has its own buffers, and the more there are, the shorter

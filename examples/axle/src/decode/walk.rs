@@ -14,7 +14,7 @@ use crate::{
     failure::Failure,
     input::Input,
     listing::Modes,
-    pcapng::{self, Direction, Packet, Reader},
+    pcapng::{self, Direction, LATEST_US, Packet, Reader},
 };
 
 /// Maximum number of bytes fed at once: their lines are up to 40 times as long, and are held in
@@ -53,10 +53,6 @@ pub(crate) struct Walked {
     /// Why the walk was given up. What was read is on the sheet.
     pub(crate) broken: Option<Failure>,
 }
-
-/// The last time that a packet can have, microseconds since 1970: in April 2262. Every form of
-/// export can hold it.
-pub(crate) const LATEST_US: u64 = i64::MAX as u64 / 1000;
 
 /// Packets of two directions may be in the wrong order by this much, microseconds.
 pub(crate) const SHORT_STEP_US: u64 = 10_000;

@@ -22,7 +22,7 @@ mod write;
 pub(crate) use background::Background;
 pub(crate) use classic::is_capture;
 pub(crate) use format::{Direction, link_type, protocol_of};
-pub(crate) use read::{Packet, Reader};
+pub(crate) use read::{LATEST_US, Packet, Reader};
 pub(crate) use recording::{Recording, Rotation, Stamp};
 pub(crate) use write::Writer;
 

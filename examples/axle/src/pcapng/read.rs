@@ -26,6 +26,10 @@ const MOST_INTERFACES: usize = 1024;
 /// What is kept of the name of an interface, bytes.
 const LONGEST_NAME: usize = 256;
 
+/// The last time that a packet can have, microseconds since 1970: in April 2262. Every form of
+/// export can hold it.
+pub(crate) const LATEST_US: u64 = i64::MAX as u64 / 1000;
+
 /// An interface of the current section.
 #[derive(Clone, Debug)]
 pub(crate) struct Interface {

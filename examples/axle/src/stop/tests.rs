@@ -38,7 +38,7 @@ fn a_lost_port_is_told_with_what_it_means_for_each_node() {
 #[test]
 fn a_node_and_a_robot_that_were_stopped_are_told_in_both_forms() {
     let node = Some(NodeId::N3);
-    let data = Some(OneMotor::data(axlewire::ikeya::Status::Velocity(0.0)));
+    let data = Some(OneMotor::data(ikeya::Status::Velocity(0.0)));
     let event = Event::Stopped { node, status: data, text: "0.00 rps".to_owned() };
     assert_eq!(Form::Text.plain(&event), "node 3: 0.00 rps, stopped and confirmed");
     assert_eq!(Form::Json.plain(&event), r#"{"event":"stopped","node":3,"rps":0.0}"#);
