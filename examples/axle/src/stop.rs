@@ -284,21 +284,20 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let too_short = bus.master().config().reply_timeout;
     let mut stopped = Stopped { path: bus.path().to_owned(), failure, ..Stopped::default() };
     if !is_patient && bus.could_wait_longer() {
-        stopped.failure = None;
         let damaged = bus.may_be_there();
-        // Answers to what was asked in vain are no answers, but tell who is there.
-        let failure = bus.leave_alone().err();
-        stopped.failure = stopped.failure.or(failure);
+        // What comes now is too late for an answer, but tells which ids are there.
+        stopped.failure = bus.leave_alone().err();
         let known = heard.get();
-        let first = known | damaged;
-        let rest = nodes.iter().filter(|node| !first.contains(*node)).collect();
+        let (first, rest): (Vec<_>, Vec<_>) =
+            nodes.iter().partition(|node| (known | damaged).contains(*node));
         let mut needs = None;
         // First those whose motors are known to be there.
-        for nodes in [first, rest] {
-            if nodes == first {
-                bus.begin_now(nodes, PATIENT_ATTEMPTS);
-            } else {
-                bus.begin_patiently(nodes, PATIENT_ATTEMPTS);
+        for (place, nodes) in [first, rest].into_iter().enumerate() {
+            let nodes: NodeSet = nodes.into_iter().collect();
+            match (nodes.is_empty(), place) {
+                (true, _) => continue,
+                (_, 0) => bus.begin_now(nodes, PATIENT_ATTEMPTS),
+                _ => bus.begin_patiently(nodes, PATIENT_ATTEMPTS),
             }
             stopped.failure = bus.stop(nodes).err().or(stopped.failure);
             stopped.judge_each(args, &bus, nodes, known);

@@ -305,3 +305,19 @@ fn on_a_line_with_jitter_no_motor_is_taken_for_a_silent_id() {
         assert!(stop.code == Some(1) || stop.stdout.len() == 4, "{stop:?}");
     }
 }
+
+#[test]
+fn a_stop_of_one_node_on_a_slow_line_leaves_the_others_alone() {
+    let (sim, port) = sim("ikeya --node 1:velocity --node 3:velocity --delay 0.06");
+    let spin = format!("spin -p {port} --node 1 --rps 2 --for 600 --reply-timeout 0.3");
+    let spin = Process::start(&spin);
+    sim.line("node 1: command 2.00 rps");
+    // Answers of node 1 are still on their way.
+    spin.kill();
+    let stop = Process::start(&format!("stop -p {port} -P ikeya --node 3")).end();
+    assert_eq!((stop.code, stop.stdout.len()), (Some(0), 1), "{stop:?}");
+    assert!(stop.stdout[0].starts_with("node 3: "), "{stop:?}");
+    let stop = Process::start(&format!("stop -p {port} -P ikeya --node 1")).end();
+    sim.line("node 1: command 0.00 rps");
+    assert!(stop.code == Some(0) && stop.stdout[0].starts_with("node 1: "), "{stop:?}");
+}
