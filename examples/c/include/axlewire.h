@@ -1966,6 +1966,9 @@ axle_result axle_ucp_host_get_robot_state(const struct axle_ucp_host *host,
 /// The latest report, once; `AXLE_NONE` if there is no new one. It need not be polled as an event.
 axle_result axle_ucp_host_take_report(struct axle_ucp_host *host, struct axle_ucp_report *report);
 
+/// Time of the latest ping to its pong, once, microseconds; `AXLE_NONE` if there is no new one.
+axle_result axle_ucp_host_take_round_trip(struct axle_ucp_host *host, uint32_t *round_trip_us);
+
 /// Gives the host the biases that a program has kept: a robot that boots asks for them.
 axle_result axle_ucp_host_set_imu_bias(struct axle_ucp_host *host, struct axle_ucp_imu_bias bias);
 
@@ -2098,6 +2101,10 @@ axle_result axle_ucp_robot_answer_update(struct axle_ucp_robot *robot,
 /// The calibration that is running; `AXLE_NONE` if there is none.
 axle_result axle_ucp_robot_get_calibration(const struct axle_ucp_robot *robot,
                                            axle_ucp_calibration *calibration);
+
+/// The state of the host's network, as told last; `AXLE_NONE` if it was not.
+axle_result axle_ucp_robot_get_network_state(const struct axle_ucp_robot *robot,
+                                             axle_ucp_network_state *state);
 
 /// Ends the running calibration without a result, and tells which one; `AXLE_NONE` if there is
 /// none. The host is not told.

@@ -424,6 +424,10 @@ class Host : public Role<HostCalls> {
     std::optional<Report> take_report() {
         return maybe<Report>(axle_ucp_host_take_report, object());
     }
+    std::optional<Time> take_round_trip() {
+        const auto us = maybe<std::uint32_t>(axle_ucp_host_take_round_trip, object());
+        return us ? std::optional<Time>{Time{*us}} : std::nullopt;
+    }
     Status set_bias(ImuBias bias) { return call(axle_ucp_host_set_imu_bias, object(), bias); }
     Status set_bias(MagBias bias) { return call(axle_ucp_host_set_mag_bias, object(), bias); }
 };
@@ -450,6 +454,9 @@ class Robot : public Role<RobotCalls> {
     }
     std::optional<axle_ucp_calibration> calibration() const {
         return maybe<axle_ucp_calibration>(axle_ucp_robot_get_calibration, object());
+    }
+    std::optional<axle_ucp_network_state> network_state() const {
+        return maybe<axle_ucp_network_state>(axle_ucp_robot_get_network_state, object());
     }
     std::optional<axle_ucp_calibration> abort_calibration() {
         return maybe<axle_ucp_calibration>(axle_ucp_robot_abort_calibration, object());

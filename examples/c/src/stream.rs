@@ -144,7 +144,10 @@ impl IkeyaDecoder {
 
 /// What C calls of a decoder.
 pub(crate) trait Decode {
-    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event>;
+    /// Writes the next event in the held bytes and the input; whether there is one.
+    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool;
+    /// The same of the held bytes alone.
+    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool;
     fn push(&mut self, byte: u8) -> bool;
     fn spare(&mut self) -> &mut [u8];
     fn commit(&mut self, len: usize);
@@ -178,9 +181,11 @@ frames!(
     &ucp::Frame
 );
 
-#[inline]
-fn event<F: Bytes>(event: Event<F>) -> axle_stream_event {
-    match event {
+/// Writes an event where C wants it, without a copy: it is as long as four frames of a bus.
+#[inline(always)]
+fn write<F: Bytes>(event: Option<Event<F>>, to: Out<axle_stream_event>) -> bool {
+    let Some(event) = event else { return false };
+    to.write(match event {
         Event::Frame(frame) => {
             let bytes = frame.bytes();
             axle_stream_event {
@@ -205,7 +210,8 @@ fn event<F: Bytes>(event: Event<F>) -> axle_stream_event {
             length: 0,
             skipped: gap.len,
         },
-    }
+    });
+    true
 }
 
 impl<F: Framing, const N: usize> Decode for axlewire::stream::Decoder<F, N>
@@ -213,8 +219,13 @@ where
     for<'a> F::Frame<'a>: Bytes,
 {
     #[inline]
-    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event> {
-        self.decode(input).map(event)
+    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool {
+        write(self.decode(input), event)
+    }
+
+    #[inline]
+    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool {
+        write(self.poll(), event)
     }
 
     #[inline]
@@ -255,8 +266,13 @@ where
 
 impl Decode for IkeyaDecoder {
     #[inline]
-    fn decode(&mut self, input: &mut &[u8]) -> Option<axle_stream_event> {
-        of_framing!(self, it => Decode::decode(it, input))
+    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool {
+        of_framing!(self, it => it.decode_to(input, event))
+    }
+
+    #[inline]
+    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool {
+        of_framing!(self, it => it.poll_to(event))
     }
 
     #[inline]
@@ -338,13 +354,13 @@ where
     let next = || {
         let (event, out_data, out_length) = (Out::new(event)?, Out::new(data)?, Out::new(length)?);
         let (data, length) = (read(data)?, read(length)?);
-        let (next, rest) = enter_with(decoder, data, length, |decoder, bytes| {
+        enter_with(decoder, data, length, |decoder, bytes| {
             let mut rest = bytes;
-            (decoder.decode(&mut rest), rest.len())
-        })?;
-        out_data.write(data.wrapping_add(length - rest));
-        out_length.write(rest);
-        Ok(next.map_or(AXLE_NONE, |next| event.write(next)))
+            let has_event = decoder.decode_to(&mut rest, event);
+            out_data.write(data.wrapping_add(length - rest.len()));
+            out_length.write(rest.len());
+            if has_event { AXLE_OK } else { AXLE_NONE }
+        })
     };
     next().unwrap_or_else(|error: axle_result| error)
 }
@@ -355,8 +371,8 @@ where
 {
     let next = || {
         let event = Out::new(event)?;
-        let next = enter(decoder, |decoder| decoder.decode(&mut &[][..]))?;
-        Ok(next.map_or(AXLE_NONE, |next| event.write(next)))
+        let has_event = enter(decoder, |decoder| decoder.poll_to(event))?;
+        Ok(if has_event { AXLE_OK } else { AXLE_NONE })
     };
     next().unwrap_or_else(|error| error)
 }

@@ -384,6 +384,7 @@ fn of_host() -> Functions<axle_ucp_host> {
         axle_ucp_host_end_firmware_update(5);
         axle_ucp_host_get_robot_state(out::<axle_ucp_robot_state>());
         axle_ucp_host_take_report(out::<axle_ucp_report>());
+        axle_ucp_host_take_round_trip(out::<u32>());
         axle_ucp_host_set_imu_bias(axle_ucp_imu_bias::default());
         axle_ucp_host_set_mag_bias(axle_ucp_mag_bias::default());
         axle_ucp_host_get_statistics(out::<axle_ucp_host_statistics>());
@@ -406,6 +407,7 @@ fn of_robot() -> Functions<axle_ucp_robot> {
         axle_ucp_robot_calibration_result_mag(axle_ucp_mag_bias::default(), 5);
         axle_ucp_robot_answer_update(AXLE_UCP_OTA_FORBIDDEN, 5);
         axle_ucp_robot_get_calibration(out::<axle_ucp_calibration>());
+        axle_ucp_robot_get_network_state(out::<axle_ucp_network_state>());
         axle_ucp_robot_abort_calibration(out::<axle_ucp_calibration>());
         axle_ucp_robot_get_statistics(out::<axle_ucp_robot_statistics>());
         axle_ucp_robot_get_counters(out::<axle_counters>());

@@ -624,6 +624,15 @@ pub extern "C" fn axle_ucp_host_take_report(
     get(host, report, |host| host.take_report().map(Into::into))
 }
 
+/// Time of the latest ping to its pong, once, microseconds; `AXLE_NONE` if there is no new one.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_host_take_round_trip(
+    host: *mut axle_ucp_host,
+    round_trip_us: *mut u32,
+) -> axle_result {
+    get(host, round_trip_us, |host| host.take_round_trip().map(|span| span.as_micros()))
+}
+
 /// Gives the host the biases that a program has kept: a robot that boots asks for them.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_set_imu_bias(

@@ -358,6 +358,15 @@ pub extern "C" fn axle_ucp_robot_get_calibration(
     get(robot, calibration, |robot| robot.calibrating().map(Into::into))
 }
 
+/// The state of the host's network, as told last; `AXLE_NONE` if it was not.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_robot_get_network_state(
+    robot: *const axle_ucp_robot,
+    state: *mut axle_ucp_network_state,
+) -> axle_result {
+    get(robot, state, |robot| robot.network_state().map(Into::into))
+}
+
 /// Ends the running calibration without a result, and tells which one; `AXLE_NONE` if there is
 /// none. The host is not told.
 #[unsafe(no_mangle)]

@@ -299,6 +299,8 @@ impl Pair for Robot {
         same(command, Some(motor(self.command(now))));
         let calibration = value(|to| axle_ucp_robot_get_calibration(object, to));
         same(calibration, self.calibrating().map(u8::from));
+        let state = value(|to| axle_ucp_robot_get_network_state(object, to));
+        same(state, self.network_state().map(u32::from));
         let of = self.statistics();
         let counts = axle_ucp_robot_statistics {
             commands: of.commands,
