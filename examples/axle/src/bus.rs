@@ -429,7 +429,7 @@ impl<B: Boards> Bus<B> {
         let coast = span(self.master().config().coast);
         let time = |bus: &Self| bus.session.awake() - begin;
         // Until each id has been asked as often as it is to be, if the port works.
-        let config = self.master().config();
+        let config = *self.master().config();
         let reads = u32::from(config.attempts) * nodes.len() as u32;
         let asking = patience.max(span(config.reply_timeout) * (reads + 1));
         while self.heard(nodes) != nodes
@@ -439,6 +439,13 @@ impl<B: Boards> Bus<B> {
             if !goes_on(self) {
                 return Ok(());
             }
+            if self.look().is_err() {
+                clock::sleep(FAILURE_PAUSE);
+            }
+        }
+        // The latest READ has its time, too.
+        let (answered, end) = (self.heard(nodes), time(self) + span(config.reply_timeout));
+        while answered != nodes && self.heard(nodes) == answered && time(self) < end {
             if self.look().is_err() {
                 clock::sleep(FAILURE_PAUSE);
             }

@@ -203,9 +203,7 @@ impl Stopped {
                     let text = status.map(|it| it.to_string()).unwrap_or_default();
                     tell(args, &Event::Stopped { node: Some(node), status, text });
                 }
-                Halt::Silent if known.contains(node) => self.complaints.push(format!(
-                    "node {node} has answered before, but no more: its motor may be moving"
-                )),
+                Halt::Silent if known.contains(node) => self.complaints.push(out_of_time(node)),
                 Halt::Silent if args.node.is_none() => self.silent.push(node),
                 _ => self.complaints.extend(bus.complaint(node)),
             }
@@ -232,6 +230,10 @@ impl Stopped {
         let heard = if self.damaged > 0 { " (damaged bytes received)" } else { "" };
         format!("no node answers on {:?}{heard}", self.path)
     }
+}
+
+fn out_of_time(node: NodeId) -> String {
+    format!("node {node} has answered, but not when it was asked: its motor may be moving")
 }
 
 /// READs of an id on a slow line until it counts as silent.
@@ -300,7 +302,7 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
                 _ => bus.begin_patiently(nodes, PATIENT_ATTEMPTS),
             }
             stopped.failure = bus.stop(nodes).err().or(stopped.failure);
-            stopped.judge_each(args, &bus, nodes, known);
+            stopped.judge_each(args, &bus, nodes, heard.get());
             needs = needs.max(bus.needed_patience());
         }
         if let Some(patience) = needs.filter(|it| it.config().reply_timeout > too_short) {
@@ -309,7 +311,12 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
             );
         }
     } else {
-        stopped.judge_each(args, &bus, nodes, NodeSet::NONE);
+        stopped.judge_each(args, &bus, nodes, heard.get());
+    }
+    // An answer may have come since.
+    let heard = heard.get();
+    for node in stopped.silent.extract_if(.., |node| heard.contains(*node)) {
+        stopped.complaints.push(out_of_time(node));
     }
     if stopped.answered > 0 && !stopped.silent.is_empty() {
         tell(args, &Event::Silent { nodes: stopped.silent.clone() });

@@ -8,6 +8,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 root=$(cd ../../.. && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
+[ -d "$target" ] || target=$PWD
 core=thumbv7em-none-eabihf
 if [ -z "${LIB-}" ]; then
     export CARGO_PROFILE_RELEASE_PANIC=abort CARGO_PROFILE_RELEASE_OPT_LEVEL=s \

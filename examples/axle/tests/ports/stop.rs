@@ -8,17 +8,17 @@ use std::{
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, Rps, Slave, Target, WriteRequest,
+        self, Mode, NodeId, Rps, Slave, Target, VelocityResponse, WriteRequest,
         board::ThreeMotors,
         slave::{SlaveConfig, SlaveEvent},
     },
-    time,
+    stream, time,
 };
 use serde_json::Value;
 
 use super::{
     Process, TWO_NODES,
-    played::{self, Node, Said, confirmable_stops, parrot, speeds},
+    played::{self, Node, PlayedLine, Said, confirmable_stops, parrot, speeds},
     record::{decoded, fresh},
     sim, wait_until,
 };
@@ -320,4 +320,57 @@ fn a_stop_of_one_node_on_a_slow_line_leaves_the_others_alone() {
     let stop = Process::start(&format!("stop -p {port} -P ikeya --node 1")).end();
     sim.line("node 1: command 0.00 rps");
     assert!(stop.code == Some(0) && stop.stdout[0].starts_with("node 1: "), "{stop:?}");
+}
+
+/// Turning nodes that answer a READ after a time that depends on how often they were asked.
+struct Turning {
+    rps: [Rps; 8],
+    asked: [u32; 8],
+    due: Vec<(Instant, [u8; 8])>,
+}
+
+fn turning(after: impl Fn(NodeId, u32) -> Option<f64> + Send + 'static) -> PlayedLine<Turning> {
+    let start = Turning { rps: [Rps::new(3.0).unwrap(); 8], asked: [0; 8], due: Vec::new() };
+    let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
+    PlayedLine::new(start, move |shared, mut bytes| {
+        let Turning { rps, asked, due } = &mut *shared.lock().unwrap();
+        while let Some(event) = decoder.decode(&mut bytes) {
+            let stream::Event::Frame(request) = event else { continue };
+            let (node, place) = (request.id(), usize::from(request.id().get()) - 1);
+            match request {
+                ikeya::Request::Write(write) => rps[place] = Rps::new(write.as_velocity()).unwrap(),
+                ikeya::Request::Read(_) => {
+                    asked[place] += 1;
+                    let answer = *VelocityResponse::new(node, rps[place]).as_bytes();
+                    let after = after(node, asked[place]).map(Duration::from_secs_f64);
+                    due.extend(after.map(|after| (Instant::now() + after, answer)));
+                }
+            }
+        }
+        let now = Instant::now();
+        due.extract_if(.., |(at, _)| *at <= now).flat_map(|(_, answer)| answer).collect()
+    })
+}
+
+#[test]
+fn whoever_has_answered_during_a_stop_is_at_rest_or_a_failure() {
+    // Node 2 answers late, and node 1 once, very late.
+    let line = turning(|node, asked| match node {
+        NodeId::N2 => Some(0.1),
+        NodeId::N1 => (asked == 1).then_some(0.9),
+        _ => None,
+    });
+    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path)).end();
+    let says = "axle: node 1 has answered, but not when it was asked: its motor may be moving";
+    assert_eq!((stop.code, stop.stderr.last().map(|it| &**it)), (Some(1), Some(says)), "{stop:?}");
+    // Node 8 answers its last READ alone.
+    let line = turning(|node, asked| match node {
+        NodeId::N1 => Some(0.2),
+        NodeId::N8 => (asked >= 4).then_some(0.2),
+        _ => None,
+    });
+    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path)).end();
+    let is_at_rest = line.lock().rps[7] == Rps::ZERO;
+    assert!(stop.code == Some(1) || is_at_rest, "{stop:?}");
+    assert!(stop.stdout.iter().any(|line| line.starts_with("node 8: ")), "{stop:?}");
 }
