@@ -250,8 +250,18 @@ impl Echoes {
             }
             return false;
         }
-        let place = self.0.iter().position(|(_, sent)| **sent == *bytes);
-        place.is_some_and(|place| self.0.remove(place).is_some())
+        // Echoes come in the order of what was sent, some of them damaged, and before anything that
+        // others say.
+        match self.0.iter().position(|(_, sent)| **sent == *bytes) {
+            Some(place) => {
+                self.0.drain(..=place);
+                true
+            }
+            None => {
+                self.0.clear();
+                false
+            }
+        }
     }
 }
 

@@ -190,6 +190,12 @@ fn only_the_echo_of_what_was_sent_is_left_out() {
     let found = frames(&capture("echoes", &packets), "--move").unwrap();
     let times: Vec<_> = found.iter().map(|(micros, _)| micros / 1000).collect();
     assert_eq!(times, [0, 10, 20, 30, 1500]);
+    // A stop of others is no echo of an own one before their command.
+    let stop = *WriteRequest::velocity(NodeId::N1, Rps::ZERO).as_bytes();
+    let packets: [(u64, Option<Direction>, &[u8]); 3] =
+        [(0, sent, &stop), (100, heard, &write), (300, heard, &stop)];
+    let found = frames(&capture("stop", &packets), "--move").unwrap();
+    assert_eq!(found.len(), 3);
 }
 
 #[test]
