@@ -5,6 +5,7 @@
 # while the command does; PORT in it is that pseudo-terminal. CC names the compiler, clang or
 # arm-none-eabi-gcc; LIB the library, if it is built already. The image is left in target/c-node.elf.
 set -euo pipefail
+from=$PWD
 cd "$(dirname "$0")"
 root=$(cd ../../.. && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
@@ -39,4 +40,5 @@ if [ $# = 0 ]; then echo "port: $port"; wait "$qemu"; fi
 # QEMU looks once a second whether the port is open.
 exec {keep}<>"$port"
 sleep 1.2
+cd "$from"
 "${@//PORT/$port}"
