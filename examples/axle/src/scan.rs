@@ -118,8 +118,11 @@ fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
         discover(&mut bus, &signals)?;
         needs = bus.needed_patience().filter(|it| it.config().reply_timeout > too_short);
     }
-    // One of another speed or protocol was heard, too.
-    let found = still_there(&bus).max(if still_there(&bus) > 0 { known } else { 0 });
+    // If none is left, the summary tells why.
+    let found = match still_there(&bus) {
+        0 => 0,
+        still => known.max(still),
+    };
     if args.measure && found > 0 {
         times = measure::measure(&mut bus, &signals)?;
         needs = measure::proposal(&times);

@@ -3,9 +3,9 @@
 use axlewire::endpoint::{Arrival, Endpoint, Transmit, Unsent};
 
 use crate::{
-    memory::{Memory, Out, enter, enter_with},
+    memory::{Memory, Out, enter, enter_with, get},
     result::{AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
-    time::{at, micros},
+    time::at,
 };
 
 /// What has become of a frame: one of `AXLE_TRANSMIT_`.
@@ -109,12 +109,7 @@ pub(crate) fn deadline<M: Memory>(role: *const M, at_us: *mut u64) -> axle_resul
 where
     M::Value: Endpoint,
 {
-    let poll = || {
-        let out = Out::new(at_us)?;
-        let deadline = enter(role, |role| role.poll_timeout())?;
-        Ok(deadline.map_or(AXLE_NONE, |deadline| out.write(deadline.as_micros())))
-    };
-    poll().unwrap_or_else(|error| error)
+    get(role, at_us, |role| role.poll_timeout().map(|deadline| deadline.as_micros()))
 }
 
 /// The rules of a role's line.
@@ -122,16 +117,14 @@ pub(crate) fn rules<M: Memory>(role: *const M, rules: *mut axle_line_rules) -> a
 where
     M::Value: Endpoint,
 {
-    let get = || {
-        let out = Out::new(rules)?;
-        let rules = enter(role, |role| role.line_rules())?;
-        Ok(out.write(axle_line_rules {
+    get(role, rules, |role| {
+        let rules = role.line_rules();
+        Some(axle_line_rules {
             frame_pause_us: rules.frame_pause.as_micros(),
             baud: rules.baud,
-            held_up_after_us: rules.held_up_after.map_or(u32::MAX, |it| micros(Some(it))),
-        }))
-    };
-    get().unwrap_or_else(|error| error)
+            held_up_after_us: rules.held_up_after.map_or(u32::MAX, |it| it.as_micros()),
+        })
+    })
 }
 
 /// The functions of a role with these names.

@@ -8,7 +8,7 @@ use core::{
 
 use crate::result::{
     AXLE_ERROR_ALIGNMENT, AXLE_ERROR_BUSY, AXLE_ERROR_NOT_INITIALIZED, AXLE_ERROR_NULL,
-    AXLE_ERROR_OVERLAP, AXLE_ERROR_SIZE, AXLE_ERROR_TOO_LONG, AXLE_OK, axle_result,
+    AXLE_ERROR_OVERLAP, AXLE_ERROR_SIZE, AXLE_ERROR_TOO_LONG, AXLE_NONE, AXLE_OK, axle_result,
 };
 
 /// A type of the header: memory for an object.
@@ -224,4 +224,18 @@ impl<T> Out<T> {
         unsafe { self.0.write(value) };
         AXLE_OK
     }
+}
+
+/// Writes what a function finds in an object, or says that there is nothing.
+#[inline]
+pub(crate) fn get<M: Memory, T>(
+    role: *const M,
+    to: *mut T,
+    of: impl FnOnce(&mut M::Value) -> Option<T>,
+) -> axle_result {
+    let get = || {
+        let out = Out::new(to)?;
+        Ok(enter(role, of)?.map_or(AXLE_NONE, |value| out.write(value)))
+    };
+    get().unwrap_or_else(|error| error)
 }

@@ -7,7 +7,7 @@ use axlewire::{
 };
 
 use crate::{
-    memory::{Memory, Out, enter, enter_with, init, read},
+    memory::{Memory, Out, enter, enter_with, get, init, read},
     result::{AXLE_ERROR_FULL, AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
 };
 
@@ -415,22 +415,14 @@ fn counters<M: Memory>(decoder: *const M, counters: *mut axle_counters) -> axle_
 where
     M::Value: Decode,
 {
-    let get = || {
-        let out = Out::new(counters)?;
-        Ok(out.write(enter(decoder, |decoder| decoder.counters())?.into()))
-    };
-    get().unwrap_or_else(|error| error)
+    get(decoder, counters, |decoder| Some(decoder.counters().into()))
 }
 
 fn pending<M: Memory>(decoder: *const M, count: *mut usize) -> axle_result
 where
     M::Value: Decode,
 {
-    let get = || {
-        let out = Out::new(count)?;
-        Ok(out.write(enter(decoder, |decoder| decoder.pending())?))
-    };
-    get().unwrap_or_else(|error| error)
+    get(decoder, count, |decoder| Some(decoder.pending()))
 }
 
 /// The functions of a decoder with these names.

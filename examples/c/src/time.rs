@@ -1,6 +1,6 @@
 //! Time, in microseconds.
 
-use axlewire::time::{Duration, Instant};
+use axlewire::time::{Duration, Instant, Wrapping32};
 
 use crate::{memory::read, result::axle_result};
 
@@ -21,8 +21,9 @@ plain!(axle_clock32);
 pub extern "C" fn axle_clock32_at(clock: *mut axle_clock32, timer_us: u32) -> u64 {
     let update = || -> Result<u64, axle_result> {
         let latest = read(clock)?.latest_us;
-        let elapsed = timer_us.wrapping_sub(latest as u32);
-        let latest_us = latest.wrapping_add(elapsed.into());
+        let timer = Wrapping32::new();
+        let before = timer.at(latest as u32);
+        let latest_us = (at(latest) + (timer.at(timer_us) - before)).as_micros();
         crate::memory::Out::new(clock)?.write(axle_clock32 { latest_us });
         Ok(latest_us)
     };

@@ -157,8 +157,7 @@ impl<V: Voice> Playing<'_, V> {
             attendance.check(now)?;
             self.voice.check()?;
             if let Some((due, at, _)) = self.taken.take_if(|_| self.voice.is_free()) {
-                self.sum.count_sent(now - at);
-                (end, free_at) = (after(now, self.plan.linger_us), now + self.line_time(&due));
+                (end, free_at) = self.has_left(&due, at, now);
             }
             if self.taken.as_ref().is_some_and(|(.., at)| now - *at >= PATIENCE) {
                 break;
@@ -183,11 +182,7 @@ impl<V: Voice> Playing<'_, V> {
                     free_in_time = at + self.line_time(&due);
                 }
                 match given {
-                    Given::Sent => {
-                        self.sum.count_sent(now - at);
-                        end = after(now, self.plan.linger_us);
-                        free_at = now + self.line_time(&due);
-                    }
+                    Given::Sent => (end, free_at) = self.has_left(&due, at, now),
                     Given::Taken => self.taken = Some((due, at, now)),
                     Given::Lost => self.sum.lost += 1,
                     Given::LeftOut => self.sum.left_out += 1,
@@ -200,6 +195,13 @@ impl<V: Voice> Playing<'_, V> {
             }
         }
         Ok(())
+    }
+
+    /// Counts a frame that was due then; when the time to listen is over, and when the line is
+    /// free.
+    fn has_left(&mut self, due: &Due, at: Instant, now: Instant) -> (Instant, Instant) {
+        self.sum.count_sent(now - at);
+        (after(now, self.plan.linger_us), now + self.line_time(due))
     }
 
     /// How long the line is in use for a frame and its answer. A master knows that on its own.

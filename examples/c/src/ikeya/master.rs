@@ -15,8 +15,8 @@ use axlewire::{
 
 use super::{Motors, axle_ikeya_mode, axle_ikeya_motion, axle_ikeya_position, mode_of, node_from};
 use crate::{
-    memory::{Memory, Out, enter, init, read},
-    result::{AXLE_ERROR_VALUE, AXLE_NONE, axle_result, of, of_encode, of_master},
+    memory::{Memory, Out, enter, get, init, read},
+    result::{AXLE_ERROR_VALUE, axle_result, of, of_encode, of_master},
     stream::axle_counters,
     time::{at, micros, optional, span},
 };
@@ -483,18 +483,6 @@ pub extern "C" fn axle_ikeya_master_config_usb_adapter(
     config: *mut axle_ikeya_master_config,
 ) -> axle_result {
     Out::new(config).map_or_else(|error| error, |out| out.write(MasterConfig::usb_adapter().into()))
-}
-
-pub(crate) fn get<M: Memory, T>(
-    role: *const M,
-    to: *mut T,
-    of: impl FnOnce(&mut M::Value) -> Option<T>,
-) -> axle_result {
-    let get = || {
-        let out = Out::new(to)?;
-        Ok(enter(role, of)?.map_or(AXLE_NONE, |value| out.write(value)))
-    };
-    get().unwrap_or_else(|error| error)
 }
 
 fn of_node<M: Memory>(

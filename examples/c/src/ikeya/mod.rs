@@ -1,6 +1,6 @@
 //! The motor bus: packets, master and slave.
 
-pub(crate) mod master;
+mod master;
 mod packet;
 mod slave;
 

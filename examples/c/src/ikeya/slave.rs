@@ -10,11 +10,10 @@ use axlewire::{
 };
 
 use super::{
-    Motors, axle_ikeya_mode, axle_ikeya_motion, axle_ikeya_position, master::get, mode_from,
-    mode_of, node_from,
+    Motors, axle_ikeya_mode, axle_ikeya_motion, axle_ikeya_position, mode_from, mode_of, node_from,
 };
 use crate::{
-    memory::{Out, enter, init, read},
+    memory::{Out, enter, get, init, read},
     result::{AXLE_ERROR_VALUE, AXLE_OK, axle_result, of, of_encode},
     stream::axle_counters,
     time::{at, micros, optional, span},

@@ -16,8 +16,8 @@ use super::values::{
     axle_ucp_network_state, axle_ucp_ota_status, axle_ucp_telemetry,
 };
 use crate::{
-    ikeya::{axle_latency, get},
-    memory::{Out, enter, init, read},
+    ikeya::axle_latency,
+    memory::{Out, enter, get, init, read},
     result::{axle_result, of, of_encode, of_host},
     stream::axle_counters,
     time::{at, micros, optional, span},

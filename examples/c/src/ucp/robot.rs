@@ -14,8 +14,7 @@ use super::values::{
     axle_ucp_network_state, axle_ucp_ota_status, axle_ucp_telemetry,
 };
 use crate::{
-    ikeya::get,
-    memory::{Out, enter, init, read},
+    memory::{Out, enter, get, init, read},
     result::{AXLE_NONE, AXLE_OK, axle_result, of},
     stream::axle_counters,
     time::{at, micros, optional, span},
