@@ -37,7 +37,8 @@ mod search;
 mod split;
 
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
-pub(crate) use batch::Rejected;
+#[doc(hidden)]
+pub use batch::Rejected;
 #[cfg(all(test, feature = "std", any(feature = "ikeya", feature = "ucp")))]
 pub(crate) use batch::tests::check_batches;
 #[cfg(feature = "alloc")]

@@ -1767,6 +1767,19 @@ axle_result axle_ikeya_decoder_decode(struct axle_ikeya_decoder *decoder,
                                       size_t *length,
                                       struct axle_stream_event *event);
 
+/// The next frames and gaps, at most `capacity` of them, for a long recording: one call
+/// instead of one for each. Writes their number to `*count`; `AXLE_NONE` and 0 once all
+/// bytes are used up.
+///
+/// Fewer than `capacity` do not tell that all are used up: a frame that began in earlier
+/// data is the last one of its call, as it is held in the decoder.
+axle_result axle_ikeya_decoder_decode_many(struct axle_ikeya_decoder *decoder,
+                                           const uint8_t **data,
+                                           size_t *length,
+                                           struct axle_stream_event *events,
+                                           size_t capacity,
+                                           size_t *count);
+
 /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
 ///
 /// Poll until `AXLE_NONE` before the next byte: a full decoder refuses it, with
@@ -1808,6 +1821,19 @@ axle_result axle_ucp_decoder_decode(struct axle_ucp_decoder *decoder,
                                     const uint8_t **data,
                                     size_t *length,
                                     struct axle_stream_event *event);
+
+/// The next frames and gaps, at most `capacity` of them, for a long recording: one call
+/// instead of one for each. Writes their number to `*count`; `AXLE_NONE` and 0 once all
+/// bytes are used up.
+///
+/// Fewer than `capacity` do not tell that all are used up: a frame that began in earlier
+/// data is the last one of its call, as it is held in the decoder.
+axle_result axle_ucp_decoder_decode_many(struct axle_ucp_decoder *decoder,
+                                         const uint8_t **data,
+                                         size_t *length,
+                                         struct axle_stream_event *events,
+                                         size_t capacity,
+                                         size_t *count);
 
 /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
 ///

@@ -206,8 +206,9 @@ namespace detail {
 #define AXLE_CALL(c, name) static constexpr auto name = ::c##_##name;
 #define AXLE_DECODER(c)                                                                            \
     using Object = ::c;                                                                            \
-    AXLE_CALL(c, decode) AXLE_CALL(c, push) AXLE_CALL(c, poll) AXLE_CALL(c, spare)                 \
-    AXLE_CALL(c, commit) AXLE_CALL(c, idle) AXLE_CALL(c, get_pending) AXLE_CALL(c, get_counters)
+    AXLE_CALL(c, decode) AXLE_CALL(c, decode_many) AXLE_CALL(c, push) AXLE_CALL(c, poll)           \
+    AXLE_CALL(c, spare) AXLE_CALL(c, commit) AXLE_CALL(c, idle) AXLE_CALL(c, get_pending)          \
+    AXLE_CALL(c, get_counters)
 #define AXLE_ROLE(c, kind)                                                                         \
     using Object = ::c;                                                                            \
     using Event = ::kind##_event;                                                                  \
@@ -275,6 +276,15 @@ class Decoder : public Memory<typename C::Object> {
         auto event = maybe<axle_stream_event>(C::decode, object(), &data, &size);
         bytes = {data, size};
         return event;
+    }
+    /// The same of up to N events; returns their number, and 0 once all bytes are used up.
+    template <std::size_t N>
+    std::size_t decode(Bytes &bytes, std::array<axle_stream_event, N> &events) {
+        const std::uint8_t *data = bytes.data();
+        std::size_t size = bytes.size();
+        const auto count = get<std::size_t>(C::decode_many, object(), &data, &size, events.data(), N);
+        bytes = {data, size};
+        return count.value_or(0);
     }
     Status push(std::uint8_t byte) { return call(C::push, object(), byte); }
     std::optional<axle_stream_event> poll() { return maybe<axle_stream_event>(C::poll, object()); }

@@ -90,6 +90,10 @@ static void decode() {
     CHECK(gap && gap->kind == AXLE_STREAM_SKIPPED && gap->skipped == 2);
     CHECK(found && found->kind == AXLE_STREAM_FRAME && found->length == frame->size());
     CHECK(!decoder.decode(rest) && rest.empty() && decoder.counters()->frames == 1);
+    std::array<axle_stream_event, 4> events{};
+    rest = line;
+    CHECK(decoder.decode(rest, events) == 2 && events[1].length == frame->size());
+    CHECK(decoder.decode(rest, events) == 0 && rest.empty() && decoder.counters()->frames == 2);
 
     axle::Packet read{};
     read.kind = AXLE_IKEYA_PACKET_READ;

@@ -8,7 +8,8 @@ use core::{
 
 use crate::result::{
     AXLE_ERROR_ALIGNMENT, AXLE_ERROR_BUSY, AXLE_ERROR_NOT_INITIALIZED, AXLE_ERROR_NULL,
-    AXLE_ERROR_OVERLAP, AXLE_ERROR_SIZE, AXLE_ERROR_TOO_LONG, AXLE_NONE, AXLE_OK, axle_result,
+    AXLE_ERROR_OVERLAP, AXLE_ERROR_SIZE, AXLE_ERROR_TOO_LONG, AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK,
+    axle_result,
 };
 
 /// A type of the header: memory for an object.
@@ -208,6 +209,23 @@ macro_rules! plain {
 }
 plain!(u8, usize, u64, f32, *const u8);
 
+/// Where to write values, at least one.
+pub(crate) fn slots<'a, T>(
+    to: *mut T,
+    capacity: usize,
+) -> Result<&'a mut [MaybeUninit<T>], axle_result> {
+    aligned(to)?;
+    if capacity == 0 {
+        return Err(AXLE_ERROR_VALUE);
+    }
+    if capacity > isize::MAX as usize / size_of::<T>() {
+        return Err(AXLE_ERROR_TOO_LONG);
+    }
+    // SAFETY: aligned, not null, not too long; the caller promises that so many values can be
+    // written there, and that nobody else uses them during the call.
+    Ok(unsafe { slice::from_raw_parts_mut(to.cast(), capacity) })
+}
+
 /// Where to write an output: checked before anything is done.
 pub(crate) struct Out<T>(*mut T);
 
@@ -216,6 +234,14 @@ impl<T> Out<T> {
     pub(crate) fn new(to: *mut T) -> Result<Self, axle_result> {
         aligned(to)?;
         Ok(Self(to))
+    }
+
+    /// The place itself.
+    #[inline]
+    pub(crate) fn slot<'a>(self) -> &'a mut MaybeUninit<T> {
+        // SAFETY: aligned and not null; the caller promises that a value can be written there, and
+        // that nobody else uses it during the call.
+        unsafe { &mut *self.0.cast() }
     }
 
     #[inline]

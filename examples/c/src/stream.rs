@@ -1,13 +1,15 @@
 //! Decoders: bytes in, frames and gaps out.
 
+use core::{marker::PhantomData, mem::MaybeUninit, slice};
+
 use axlewire::{
     ikeya::{self, three},
-    stream::{Counters, Event, Framing, Reason},
+    stream::{self, Counters, Event, Framing, Reason, Rejected, Verdict},
     ucp,
 };
 
 use crate::{
-    memory::{Memory, Out, enter, enter_with, get, init, read},
+    memory::{Memory, Out, apart, bytes, enter, enter_with, get, init, read, slots},
     result::{AXLE_ERROR_FULL, AXLE_ERROR_VALUE, AXLE_NONE, AXLE_OK, axle_result, of},
 };
 
@@ -97,21 +99,46 @@ pub const AXLE_IKEYA3_TO_MASTER: u8 = 5;
 /// Both directions of a bus of boards with three motors.
 pub const AXLE_IKEYA3_BOTH_DIRECTIONS: u8 = 6;
 
+/// A framing whose frames are their bytes: the parsers of the header look into them.
+#[derive(Clone, Copy, Debug)]
+pub struct Raw<F>(PhantomData<F>);
+
+impl<F: Framing> Framing for Raw<F> {
+    type Frame<'a> = &'a [u8];
+    const MIN_LEN: usize = F::MIN_LEN;
+    const MAX_LEN: usize = F::MAX_LEN;
+
+    #[inline(always)]
+    fn judge(bytes: &[u8]) -> Verdict {
+        F::judge(bytes)
+    }
+
+    #[inline(always)]
+    fn view(frame: &[u8]) -> Option<&[u8]> {
+        Some(frame)
+    }
+
+    #[inline(always)]
+    fn reject_batch(bytes: &[u8]) -> Rejected {
+        F::reject_batch(bytes)
+    }
+}
+
 /// A decoder of any framing of a motor bus.
 #[derive(Clone, Debug)]
 pub enum IkeyaDecoder {
     /// One motor.
-    ToSlave(ikeya::Decoder<ikeya::ToSlave>),
+    ToSlave(ikeya::Decoder<Raw<ikeya::ToSlave>>),
     /// One motor.
-    ToMaster(ikeya::Decoder<ikeya::ToMaster>),
+    ToMaster(ikeya::Decoder<Raw<ikeya::ToMaster>>),
     /// One motor.
-    Both(ikeya::Decoder<ikeya::BothDirections>),
+    Both(ikeya::Decoder<Raw<ikeya::BothDirections>>),
     /// Three motors.
-    ToSlave3(three::Decoder<three::ToSlave>),
+    ToSlave3(three::Decoder<Raw<three::ToSlave>>),
     /// Three motors.
-    ToMaster3(three::Decoder<three::ToMaster>),
+    ToMaster3(three::Decoder<Raw<three::ToMaster>>),
     /// Three motors.
-    Both3(three::Decoder<three::BothDirections>),
+    Both3(three::Decoder<Raw<three::BothDirections>>),
 }
 
 /// Calls a method of the decoder, whatever its framing.
@@ -144,58 +171,34 @@ impl IkeyaDecoder {
 
 /// What C calls of a decoder.
 pub(crate) trait Decode {
-    /// Writes the next event in the held bytes and the input; whether there is one.
-    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool;
+    /// Writes the next events in the held bytes and the input, and returns their number. Ends
+    /// behind a frame in the held bytes: the next event would overwrite it.
+    fn decode_to(&mut self, input: &mut &[u8], events: Slots<'_>) -> usize;
     /// The same of the held bytes alone.
-    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool;
+    fn poll_to(&mut self, event: Slot<'_>) -> bool;
     fn push(&mut self, byte: u8) -> bool;
     fn spare(&mut self) -> &mut [u8];
     fn commit(&mut self, len: usize);
     fn idle(&mut self);
     fn pending(&self) -> usize;
-    fn received(&self) -> u64;
     fn counters(&self) -> Counters;
 }
 
-/// The frame of any framing as its bytes.
-trait Bytes {
-    fn bytes(&self) -> &[u8];
-}
+/// Where C wants an event. It is written there without a copy: it is as long as four frames of a
+/// bus.
+type Slot<'a> = &'a mut MaybeUninit<axle_stream_event>;
+type Slots<'a> = &'a mut [MaybeUninit<axle_stream_event>];
 
-macro_rules! frames {
-    ($($frame:ty),*) => {
-        $(impl Bytes for $frame {
-            fn bytes(&self) -> &[u8] {
-                self.as_bytes()
-            }
-        })*
-    };
-}
-frames!(
-    ikeya::Request<'_>,
-    ikeya::Response<'_>,
-    ikeya::Packet<'_>,
-    three::Request<'_>,
-    three::Response<'_>,
-    three::Packet<'_>,
-    &ucp::Frame
-);
-
-/// Writes an event where C wants it, without a copy: it is as long as four frames of a bus.
 #[inline(always)]
-fn write<F: Bytes>(event: Option<Event<F>>, to: Out<axle_stream_event>) -> bool {
-    let Some(event) = event else { return false };
+fn write(event: Event<&[u8]>, to: Slot<'_>) -> *const u8 {
     to.write(match event {
-        Event::Frame(frame) => {
-            let bytes = frame.bytes();
-            axle_stream_event {
-                kind: AXLE_STREAM_FRAME,
-                reason: 0,
-                bytes: bytes.as_ptr(),
-                length: bytes.len(),
-                skipped: 0,
-            }
-        }
+        Event::Frame(bytes) => axle_stream_event {
+            kind: AXLE_STREAM_FRAME,
+            reason: 0,
+            bytes: bytes.as_ptr(),
+            length: bytes.len(),
+            skipped: 0,
+        },
         Event::Skipped(gap) => axle_stream_event {
             kind: AXLE_STREAM_SKIPPED,
             reason: match gap.reason {
@@ -210,22 +213,28 @@ fn write<F: Bytes>(event: Option<Event<F>>, to: Out<axle_stream_event>) -> bool 
             length: 0,
             skipped: gap.len,
         },
-    });
-    true
+    })
+    .bytes
 }
 
-impl<F: Framing, const N: usize> Decode for axlewire::stream::Decoder<F, N>
-where
-    for<'a> F::Frame<'a>: Bytes,
-{
+impl<F: Framing, const N: usize> Decode for stream::Decoder<Raw<F>, N> {
     #[inline]
-    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool {
-        write(self.decode(input), event)
+    fn decode_to(&mut self, input: &mut &[u8], events: Slots<'_>) -> usize {
+        let mut count = 0;
+        for slot in events {
+            let Some(event) = self.decode(input) else { break };
+            let bytes = write(event, slot);
+            count += 1;
+            if bytes.addr().wrapping_sub((&raw const *self).addr()) < size_of::<Self>() {
+                break;
+            }
+        }
+        count
     }
 
     #[inline]
-    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool {
-        write(self.poll(), event)
+    fn poll_to(&mut self, event: Slot<'_>) -> bool {
+        self.poll().map(|found| write(found, event)).is_some()
     }
 
     #[inline]
@@ -254,11 +263,6 @@ where
     }
 
     #[inline]
-    fn received(&self) -> u64 {
-        self.received()
-    }
-
-    #[inline]
     fn counters(&self) -> Counters {
         self.counters()
     }
@@ -266,12 +270,12 @@ where
 
 impl Decode for IkeyaDecoder {
     #[inline]
-    fn decode_to(&mut self, input: &mut &[u8], event: Out<axle_stream_event>) -> bool {
-        of_framing!(self, it => it.decode_to(input, event))
+    fn decode_to(&mut self, input: &mut &[u8], events: Slots<'_>) -> usize {
+        of_framing!(self, it => it.decode_to(input, events))
     }
 
     #[inline]
-    fn poll_to(&mut self, event: Out<axle_stream_event>) -> bool {
+    fn poll_to(&mut self, event: Slot<'_>) -> bool {
         of_framing!(self, it => it.poll_to(event))
     }
 
@@ -301,15 +305,13 @@ impl Decode for IkeyaDecoder {
     }
 
     #[inline]
-    fn received(&self) -> u64 {
-        of_framing!(self, it => it.received())
-    }
-
-    #[inline]
     fn counters(&self) -> Counters {
         of_framing!(self, it => it.counters())
     }
 }
+
+/// A decoder of the link of a rover.
+type UcpDecoder = stream::Decoder<Raw<ucp::Ucp>, { ucp::MAX_LEN }>;
 
 object! {
     /// A decoder of a motor bus.
@@ -318,7 +320,7 @@ object! {
 
 object! {
     /// A decoder of the link of a rover.
-    axle_ucp_decoder, AXLE_UCP_DECODER_SIZE = 184, 23 words of ucp::Decoder, b"axDu"
+    axle_ucp_decoder, AXLE_UCP_DECODER_SIZE = 184, 23 words of UcpDecoder, b"axDu"
 }
 
 /// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
@@ -339,10 +341,32 @@ pub extern "C" fn axle_ucp_decoder_init(
     decoder: *mut axle_ucp_decoder,
     size: usize,
 ) -> axle_result {
-    init(decoder, size, || Ok(ucp::Decoder::new()))
+    init(decoder, size, || Ok(UcpDecoder::new()))
 }
 
+/// Decodes into the slots; the number of events.
+#[inline]
 fn decode<M: Memory>(
+    decoder: *mut M,
+    data: *mut *const u8,
+    length: *mut usize,
+    events: Slots<'_>,
+) -> Result<usize, axle_result>
+where
+    M::Value: Decode,
+{
+    let (out_data, out_length) = (Out::new(data)?, Out::new(length)?);
+    let (data, length) = (read(data)?, read(length)?);
+    enter_with(decoder, data, length, |decoder, bytes| {
+        let mut rest = bytes;
+        let count = decoder.decode_to(&mut rest, events);
+        out_data.write(data.wrapping_add(length - rest.len()));
+        out_length.write(rest.len());
+        count
+    })
+}
+
+fn decode_one<M: Memory>(
     decoder: *mut M,
     data: *mut *const u8,
     length: *mut usize,
@@ -351,18 +375,35 @@ fn decode<M: Memory>(
 where
     M::Value: Decode,
 {
+    let next = || decode(decoder, data, length, slice::from_mut(Out::new(event)?.slot()));
+    match next() {
+        Ok(0) => AXLE_NONE,
+        Ok(_) => AXLE_OK,
+        Err(error) => error,
+    }
+}
+
+fn decode_many<M: Memory>(
+    decoder: *mut M,
+    data: *mut *const u8,
+    length: *mut usize,
+    events: *mut axle_stream_event,
+    capacity: usize,
+    count: *mut usize,
+) -> axle_result
+where
+    M::Value: Decode,
+{
     let next = || {
-        let (event, out_data, out_length) = (Out::new(event)?, Out::new(data)?, Out::new(length)?);
-        let (data, length) = (read(data)?, read(length)?);
-        enter_with(decoder, data, length, |decoder, bytes| {
-            let mut rest = bytes;
-            let has_event = decoder.decode_to(&mut rest, event);
-            out_data.write(data.wrapping_add(length - rest.len()));
-            out_length.write(rest.len());
-            if has_event { AXLE_OK } else { AXLE_NONE }
-        })
+        let count = Out::new(count)?;
+        let size = capacity.saturating_mul(size_of::<axle_stream_event>());
+        apart(bytes(read(data)?, read(length)?)?, events.cast(), size)?;
+        let events = slots(events, capacity)?;
+        let found = decode(decoder, data, length, events)?;
+        count.write(found);
+        Ok(if found > 0 { AXLE_OK } else { AXLE_NONE })
     };
-    next().unwrap_or_else(|error: axle_result| error)
+    next().unwrap_or_else(|error| error)
 }
 
 fn poll<M: Memory>(decoder: *mut M, event: *mut axle_stream_event) -> axle_result
@@ -371,7 +412,7 @@ where
 {
     let next = || {
         let event = Out::new(event)?;
-        let has_event = enter(decoder, |decoder| decoder.poll_to(event))?;
+        let has_event = enter(decoder, |decoder| decoder.poll_to(event.slot()))?;
         Ok(if has_event { AXLE_OK } else { AXLE_NONE })
     };
     next().unwrap_or_else(|error| error)
@@ -382,17 +423,16 @@ where
     M::Value: Decode,
 {
     let push = |decoder: &mut M::Value| {
-        let before = decoder.received();
-        let has_event = decoder.push(byte);
-        // A full decoder refuses the byte.
-        (has_event, decoder.received() != before)
+        let before = decoder.pending();
+        if !decoder.push(byte) {
+            AXLE_NONE
+        } else if decoder.pending() == before {
+            AXLE_ERROR_FULL
+        } else {
+            AXLE_OK
+        }
     };
-    match enter(decoder, push) {
-        Ok((_, false)) => AXLE_ERROR_FULL,
-        Ok((true, _)) => AXLE_OK,
-        Ok((false, _)) => AXLE_NONE,
-        Err(error) => error,
-    }
+    enter(decoder, push).unwrap_or_else(|error| error)
 }
 
 fn spare<M: Memory>(decoder: *mut M, bytes: *mut *mut u8, length: *mut usize) -> axle_result
@@ -427,7 +467,7 @@ where
 
 /// The functions of a decoder with these names.
 macro_rules! decoder {
-    ($decoder:ident: $decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident
+    ($decoder:ident: $decode:ident $decode_many:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident
         $pending:ident $counters:ident) => {
         /// The next frame or gap in the bytes that are held and in `*data`; advances `*data` and
         /// `*length` past the bytes used. `AXLE_NONE` once all are used up.
@@ -440,7 +480,25 @@ macro_rules! decoder {
             length: *mut usize,
             event: *mut axle_stream_event,
         ) -> axle_result {
-            decode(decoder, data, length, event)
+            decode_one(decoder, data, length, event)
+        }
+
+        /// The next frames and gaps, at most `capacity` of them, for a long recording: one call
+        /// instead of one for each. Writes their number to `*count`; `AXLE_NONE` and 0 once all
+        /// bytes are used up.
+        ///
+        /// Fewer than `capacity` do not tell that all are used up: a frame that began in earlier
+        /// data is the last one of its call, as it is held in the decoder.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $decode_many(
+            decoder: *mut $decoder,
+            data: *mut *const u8,
+            length: *mut usize,
+            events: *mut axle_stream_event,
+            capacity: usize,
+            count: *mut usize,
+        ) -> axle_result {
+            decode_many(decoder, data, length, events, capacity, count)
         }
 
         /// Takes in one byte: `AXLE_OK` if there may be an event to poll, `AXLE_NONE` if not.
@@ -506,10 +564,12 @@ macro_rules! decoder {
 }
 
 decoder!(axle_ikeya_decoder:
-    axle_ikeya_decoder_decode axle_ikeya_decoder_push axle_ikeya_decoder_poll
+    axle_ikeya_decoder_decode axle_ikeya_decoder_decode_many axle_ikeya_decoder_push
+    axle_ikeya_decoder_poll
     axle_ikeya_decoder_spare axle_ikeya_decoder_commit axle_ikeya_decoder_idle
     axle_ikeya_decoder_get_pending axle_ikeya_decoder_get_counters);
 decoder!(axle_ucp_decoder:
-    axle_ucp_decoder_decode axle_ucp_decoder_push axle_ucp_decoder_poll
+    axle_ucp_decoder_decode axle_ucp_decoder_decode_many axle_ucp_decoder_push
+    axle_ucp_decoder_poll
     axle_ucp_decoder_spare axle_ucp_decoder_commit axle_ucp_decoder_idle
     axle_ucp_decoder_get_pending axle_ucp_decoder_get_counters);

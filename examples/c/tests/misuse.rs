@@ -213,10 +213,11 @@ fn bad_bytes<M>(object: *mut M, input: impl Fn(*const u8, usize) -> axle_result)
 }
 
 macro_rules! decoder {
-    ($decode:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident
+    ($decode:ident $many:ident $push:ident $poll:ident $spare:ident $commit:ident $idle:ident $pending:ident
         $counters:ident) => {
         calls! {
             $decode(held(bytes()), held(BYTES.len()), stream_event());
+            $many(held(bytes()), held(BYTES.len()), stream_event(), 1, out());
             $push(7);
             $poll(stream_event());
             $spare(held(null_mut()), out());
@@ -427,15 +428,15 @@ fn of_decoders() -> (Functions<axle_ikeya_decoder>, Functions<axle_ucp_decoder>)
     (
         (
             ikeya.remove(0),
-            decoder!(axle_ikeya_decoder_decode axle_ikeya_decoder_push
-            axle_ikeya_decoder_poll axle_ikeya_decoder_spare axle_ikeya_decoder_commit
+            decoder!(axle_ikeya_decoder_decode axle_ikeya_decoder_decode_many
+            axle_ikeya_decoder_push axle_ikeya_decoder_poll axle_ikeya_decoder_spare axle_ikeya_decoder_commit
             axle_ikeya_decoder_idle axle_ikeya_decoder_get_pending
             axle_ikeya_decoder_get_counters),
         ),
         (
             ucp.remove(0),
-            decoder!(axle_ucp_decoder_decode axle_ucp_decoder_push
-            axle_ucp_decoder_poll axle_ucp_decoder_spare axle_ucp_decoder_commit
+            decoder!(axle_ucp_decoder_decode axle_ucp_decoder_decode_many
+            axle_ucp_decoder_push axle_ucp_decoder_poll axle_ucp_decoder_spare axle_ucp_decoder_commit
             axle_ucp_decoder_idle axle_ucp_decoder_get_pending axle_ucp_decoder_get_counters),
         ),
     )
@@ -592,6 +593,19 @@ fn bytes_that_are_too_many_or_in_the_object_are_refused() {
             }
         }
     });
+    let many = |events: *mut axle_stream_event, capacity| {
+        let (mut from, mut length) = (events.cast_const().cast::<u8>(), 1);
+        axle_ucp_decoder_decode_many(object, &mut from, &mut length, events, capacity, out())
+    };
+    assert_eq!(many(stream_event(), 0), AXLE_ERROR_VALUE);
+    assert_eq!(many(stream_event(), 1), AXLE_ERROR_OVERLAP);
+    assert_eq!(many(stream_event(), usize::MAX), AXLE_ERROR_OVERLAP);
+    let (from, length) = (held(bytes()), held(BYTES.len()));
+    for capacity in [isize::MAX as usize, usize::MAX] {
+        let events = stream_event().wrapping_add(1 << 20);
+        let result = axle_ucp_decoder_decode_many(object, from, length, events, capacity, out());
+        assert!(matches!(result, AXLE_ERROR_TOO_LONG | AXLE_ERROR_OVERLAP), "{result}");
+    }
     let too_long = usize::MAX;
     assert_eq!(axle_ikeya_parse(bytes(), too_long, out()), AXLE_ERROR_TOO_LONG);
     assert_eq!(axle_ucp_parse(bytes(), too_long, out()), AXLE_ERROR_TOO_LONG);

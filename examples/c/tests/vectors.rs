@@ -316,6 +316,8 @@ enum Told {
 trait Stream {
     /// The next event of the bytes, and how many are left.
     fn decode(&mut self, input: &mut &[u8]) -> Option<Told>;
+    /// The next events of the bytes, at most so many.
+    fn decode_many(&mut self, input: &mut &[u8], capacity: usize) -> Vec<Told>;
     fn push(&mut self, byte: u8) -> bool;
     fn poll(&mut self) -> Option<Told>;
     /// Writes as many bytes as there is room for; returns their number.
@@ -366,6 +368,10 @@ where
         self.decode(input).map(told)
     }
 
+    fn decode_many(&mut self, input: &mut &[u8], capacity: usize) -> Vec<Told> {
+        (0..capacity).map_while(|_| self.decode(input).map(told)).collect()
+    }
+
     fn push(&mut self, byte: u8) -> bool {
         self.push(byte)
     }
@@ -396,10 +402,20 @@ where
     }
 }
 
+type DecodeMany<M> = extern "C" fn(
+    *mut M,
+    *mut *const u8,
+    *mut usize,
+    *mut axle_stream_event,
+    usize,
+    *mut usize,
+) -> i32;
+
 /// A decoder of C with its functions.
 struct InC<M> {
     memory: Box<M>,
     decode: extern "C" fn(*mut M, *mut *const u8, *mut usize, *mut axle_stream_event) -> i32,
+    decode_many: DecodeMany<M>,
     push: extern "C" fn(*mut M, u8) -> i32,
     poll: extern "C" fn(*mut M, *mut axle_stream_event) -> i32,
     spare: extern "C" fn(*mut M, *mut *mut u8, *mut usize) -> i32,
@@ -438,6 +454,18 @@ impl<M> Stream for InC<M> {
         *input = &input[input.len() - length..];
         assert_eq!(data, input.as_ptr());
         event_of(result, event)
+    }
+
+    fn decode_many(&mut self, input: &mut &[u8], capacity: usize) -> Vec<Told> {
+        let (mut data, mut length, mut count) = (input.as_ptr(), input.len(), 77);
+        let mut events: Vec<_> = (0..=capacity).map(|_| nothing()).collect();
+        let (memory, at) = (&mut *self.memory, events.as_mut_ptr());
+        let result = (self.decode_many)(memory, &mut data, &mut length, at, capacity, &mut count);
+        *input = &input[input.len() - length..];
+        assert_eq!(data, input.as_ptr());
+        assert_eq!(result, if count > 0 { AXLE_OK } else { AXLE_NONE });
+        assert!(count <= capacity && events[count..].iter().all(|event| event.kind == 77));
+        events.into_iter().take(count).filter_map(|event| event_of(result, event)).collect()
     }
 
     fn push(&mut self, byte: u8) -> bool {
@@ -492,6 +520,7 @@ fn ikeya_in_c(framing: u8) -> InC<axle_ikeya_decoder> {
         // SAFETY: it is initialised.
         memory: unsafe { memory.assume_init() },
         decode: axle_ikeya_decoder_decode,
+        decode_many: axle_ikeya_decoder_decode_many,
         push: axle_ikeya_decoder_push,
         poll: axle_ikeya_decoder_poll,
         spare: axle_ikeya_decoder_spare,
@@ -509,6 +538,7 @@ fn ucp_in_c() -> InC<axle_ucp_decoder> {
         // SAFETY: it is initialised.
         memory: unsafe { memory.assume_init() },
         decode: axle_ucp_decoder_decode,
+        decode_many: axle_ucp_decoder_decode_many,
         push: axle_ucp_decoder_push,
         poll: axle_ucp_decoder_poll,
         spare: axle_ucp_decoder_spare,
@@ -553,10 +583,11 @@ enum Way {
     Chunks,
     Pushed,
     Written,
+    Many,
     Mixed,
 }
 
-const WAYS: [Way; 4] = [Way::Chunks, Way::Pushed, Way::Written, Way::Mixed];
+const WAYS: [Way; 5] = [Way::Chunks, Way::Pushed, Way::Written, Way::Many, Way::Mixed];
 
 /// Hands the same bytes in on both sides, and compares all that is told; returns the frames.
 fn side_by_side(
@@ -584,7 +615,7 @@ fn side_by_side(
         let count = 1 + rng.below(90) as usize;
         let (mut chunk, rest) = bytes.split_at(count.min(bytes.len()));
         let turn = match way {
-            Way::Mixed => WAYS[rng.below(3) as usize],
+            Way::Mixed => WAYS[rng.below(4) as usize],
             way => way,
         };
         match turn {
@@ -603,7 +634,21 @@ fn side_by_side(
                     poll(c, rust);
                 }
             }
-            _ => loop {
+            Way::Many => {
+                let mut same = chunk;
+                loop {
+                    let many = c.decode_many(&mut chunk, 1 + rng.below(9) as usize);
+                    for told in &many {
+                        assert_eq!(rust.decode(&mut same).as_ref(), Some(told));
+                        by_decode += usize::from(matches!(told, Told::Frame(_)));
+                    }
+                    if many.is_empty() {
+                        break;
+                    }
+                }
+                assert_eq!((rust.decode(&mut same), chunk, same), (None, &[][..], &[][..]));
+            }
+            Way::Chunks | Way::Mixed => loop {
                 let mut same = chunk;
                 let (told, expected) = (c.decode(&mut chunk), rust.decode(&mut same));
                 assert_eq!((&told, chunk.len()), (&expected, same.len()));
@@ -675,7 +720,7 @@ fn noise_with_frames_in_it_is_told_in_c_as_in_rust_event_for_event() {
                     _ => stream.extend(frame),
                 }
             }
-            let way = WAYS[round % 4];
+            let way = WAYS[round % 5];
             frames[place] += side_by_side(&mut *c, &mut *rust, &stream, way, 0.02, &mut rng);
         }
     }
