@@ -173,11 +173,18 @@ impl<B: Boards> Bus<B> {
         Ok(())
     }
 
-    /// Whether an id has given only answers that are too late, and could be waited for longer.
+    /// Whether the answers of an id come too late, and could be waited for longer: all of them, or
+    /// so many that it counts as offline, although one was in time by chance.
     pub(crate) fn could_wait_longer(&self) -> bool {
         let config = self.master().config();
-        let is_late = |node| self.status(node).is_none() && self.late(node) > 0;
+        let is_late = |node| self.late(node) > 0 && !self.is_online(node);
         config.reply_timeout < SLOW_TIMEOUT && config.nodes.iter().any(is_late)
+    }
+
+    /// The same, once each id has been asked.
+    fn must_wait_longer(&self) -> bool {
+        let mut nodes = self.master().config().nodes.iter();
+        self.could_wait_longer() && !nodes.any(|node| self.is_unasked(node, 1))
     }
 
     /// Ids that have answered, in time or not.
@@ -412,10 +419,10 @@ impl<B: Boards> Bus<B> {
         self.stop_while(nodes, |_| true)
     }
 
-    /// The same, but gives up at once if an answer comes too late, and could be waited for: from
-    /// then on, an answer may be that to an older READ.
+    /// The same, but if an answer comes too late, and could be waited for, gives up as soon as each
+    /// id has been asked: from then on, an answer may be that to an older READ.
     pub(crate) fn stop_in_time(&mut self, nodes: NodeSet) -> Result<(), Failure> {
-        self.stop_while(nodes, |bus| !bus.could_wait_longer())
+        self.stop_while(nodes, |bus| !bus.must_wait_longer())
     }
 
     fn stop_while(
@@ -423,35 +430,63 @@ impl<B: Boards> Bus<B> {
         nodes: NodeSet,
         goes_on: impl Fn(&Self) -> bool,
     ) -> Result<(), Failure> {
-        let (now, begin) = (self.now(), self.session.awake());
+        let begin = self.session.awake();
+        self.tell_to_stop(nodes);
+        self.await_answers(nodes, self.master().config().attempts, &goes_on);
+        if goes_on(self) { self.confirm_stops(nodes, begin) } else { Ok(()) }
+    }
+
+    /// The same of all nodes of the master. These are asked once, and told to stop, before the
+    /// others; whatever becomes of them then, the others do not wait for it.
+    pub(crate) fn stop_all_but_first(&mut self, first: NodeSet) -> Result<(), Failure> {
+        let (config, begin) = (*self.master().config(), self.session.awake());
+        self.tell_to_stop(first);
+        self.await_answers(first, 1, |_| true);
+        self.tell_to_stop(config.nodes.iter().filter(|node| !first.contains(*node)).collect());
+        self.await_answers(config.nodes, config.attempts, |_| true);
+        self.confirm_stops(config.nodes, begin)
+    }
+
+    fn tell_to_stop(&mut self, nodes: NodeSet) {
+        let now = self.now();
         nodes.iter().for_each(|node| self.master_mut().stop(node, now));
-        let patience = span(self.master().stop_bound()).max(STOP_PATIENCE);
-        let coast = span(self.master().config().coast);
+    }
+
+    /// Waits until each of these nodes has answered, or was asked this often and counts as silent.
+    fn await_answers(&mut self, nodes: NodeSet, attempts: u8, goes_on: impl Fn(&Self) -> bool) {
+        let begin = self.session.awake();
         let time = |bus: &Self| bus.session.awake() - begin;
         // Until each id has been asked as often as it is to be, if the port works.
-        let config = *self.master().config();
-        let reads = u32::from(config.attempts) * nodes.len() as u32;
-        let asking = patience.max(span(config.reply_timeout) * (reads + 1));
+        let window = span(self.master().config().reply_timeout);
+        let asking =
+            self.stop_patience().max(window * (u32::from(attempts) * nodes.len() as u32 + 1));
+        let silence = if attempts > 1 { SILENCE } else { Span::ZERO };
         while self.heard(nodes) != nodes
             && time(self) < asking
-            && (time(self) < SILENCE || nodes.iter().any(|node| self.is_unasked(node)))
+            && (time(self) < silence || nodes.iter().any(|node| self.is_unasked(node, attempts)))
         {
             if !goes_on(self) {
-                return Ok(());
+                return;
             }
             if self.look().is_err() {
                 clock::sleep(FAILURE_PAUSE);
             }
         }
         // The latest READ has its time, too.
-        let (answered, end) = (self.heard(nodes), time(self) + span(config.reply_timeout));
+        let (answered, end) = (self.heard(nodes), time(self) + window);
         while answered != nodes && self.heard(nodes) == answered && time(self) < end {
             if self.look().is_err() {
                 clock::sleep(FAILURE_PAUSE);
             }
         }
+    }
+
+    /// Waits until those of these nodes that have answered are still.
+    fn confirm_stops(&mut self, nodes: NodeSet, begin: Span) -> Result<(), Failure> {
+        let (patience, coast) = (self.stop_patience(), span(self.master().config().coast));
         loop {
             let heard = self.heard(nodes);
+            let time = |bus: &Self| bus.session.awake() - begin;
             let is_over = match self.session.stop(heard) {
                 // A node that was silent may have answered meanwhile.
                 Ok(()) => self.heard(nodes) == heard,
@@ -465,15 +500,20 @@ impl<B: Boards> Bus<B> {
         }
     }
 
+    /// Time within which nodes that answer confirm a stop.
+    fn stop_patience(&self) -> Span {
+        span(self.master().stop_bound()).max(STOP_PATIENCE)
+    }
+
     /// Those of these nodes that have ever answered.
     fn heard(&self, nodes: NodeSet) -> NodeSet {
         nodes.iter().filter(|&node| self.status(node).is_some()).collect()
     }
 
-    /// Whether an id has never answered, but was not asked often enough to count as silent.
-    fn is_unasked(&self, node: NodeId) -> bool {
-        let attempts = u32::from(self.master().config().attempts);
-        self.status(node).is_none() && self.master().node_statistics(node).requests < attempts
+    /// Whether an id has never answered, but was asked less often than this.
+    fn is_unasked(&self, node: NodeId, attempts: u8) -> bool {
+        let requests = self.master().node_statistics(node).requests;
+        self.status(node).is_none() && requests < attempts.into()
     }
 
     /// Outcome so far for a node that was told to stop.
@@ -507,7 +547,8 @@ impl<B: Boards> Bus<B> {
                 )
             }
             Halt::Owed => {
-                let heard = heard(self.is_online(node), self.master().last_failure(node));
+                let is_late = self.late(node) > 0;
+                let heard = heard(self.is_online(node), is_late, self.master().last_failure(node));
                 format!(
                     "node {node} was told to stop and has not confirmed it{heard}: it may be moving"
                 )
@@ -536,9 +577,10 @@ fn span(duration: Duration) -> Span {
 }
 
 /// What was heard of a node that has not confirmed its stop.
-const fn heard(is_online: bool, failure: Option<Cause>) -> &'static str {
+const fn heard(is_online: bool, is_late: bool, failure: Option<Cause>) -> &'static str {
     match failure {
         _ if is_online => "",
+        _ if is_late => " (its answers come too late)",
         Some(Cause::Damaged) => " (damaged bytes received)",
         Some(Cause::Unexpected) => " (other answers received)",
         _ => " (nothing received)",

@@ -36,6 +36,9 @@ use crate::{
 /// zero motor commands every 100 ms until the reports show that all wheels have stopped; a robot
 /// without reports may be moving, and is a failure.
 ///
+/// Without --reply-timeout, a line on which answers come late is read once more with half a second
+/// for each; with it, an answer that comes later is a failure.
+///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
 /// within about 10 seconds, and within 90 on a line on which answers come late; Ctrl-C, Ctrl-Z and
 /// Ctrl-\ do not cut it short.
@@ -43,7 +46,8 @@ use crate::{
 /// What is sent on the wire: with --protocol ikeya or ikeya-3, READ packets for ids 1 to 8, or for
 /// --node only, and WRITE packets for those that answer; with --protocol ucp, zero motor commands
 /// and pings. Without --protocol, first the READ packets of one-motor boards, for one second, at
-/// 500000 bit/s; if nothing answers, then zero motor commands and pings at 115200 bit/s. Any byte
+/// 500000 bit/s; if boards with three motors answer, these are stopped; if nothing answers, then
+/// zero motor commands and pings at 115200 bit/s. Any byte
 /// keeps a vendor robot going for 500 ms, so for a rover --protocol ucp is faster by that second.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
@@ -159,9 +163,12 @@ impl Lines<'_> {
     }
 }
 
-/// Stops a bus if a node answers, otherwise a rover.
+/// Stops a bus if a node answers, with boards of either kind, otherwise a rover.
 fn stop_whatever(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
-    let bus = stop_bus::<OneMotor>(args, lines)?;
+    let mut bus = stop_bus::<OneMotor>(args, lines)?;
+    if bus.heard == 0 && bus.others {
+        bus = stop_bus::<ThreeMotors>(args, lines)?;
+    }
     if bus.heard > 0 || args.node.is_some() {
         return bus.judge();
     }
@@ -185,14 +192,18 @@ struct Stopped {
     damaged: usize,
     /// One message for each node that is not known to be at rest.
     complaints: Vec<String>,
+    /// Whether boards of the other kind have answered.
+    others: bool,
+    /// What else was heard.
+    hint: &'static str,
     /// Failure of the port.
     failure: Option<Failure>,
 }
 
 impl Stopped {
-    /// Tells what has become of these nodes, some of which are known to have answered before.
-    fn judge_each<B: Boards>(&mut self, args: &Args, bus: &Bus<B>, nodes: NodeSet, known: NodeSet) {
-        for node in nodes.iter() {
+    /// Tells what has become of the nodes, some of which are known to have answered.
+    fn judge_each<B: Boards>(&mut self, args: &Args, bus: &Bus<B>, known: NodeSet) {
+        for node in bus.master().config().nodes.iter() {
             self.answered += usize::from(bus.status(node).is_some());
             let is_heard = known.contains(node) || bus.those_heard().contains(node);
             self.heard += usize::from(is_heard);
@@ -224,11 +235,12 @@ impl Stopped {
 
     /// What is not at rest, or that nothing was heard.
     fn complaint(&self) -> String {
+        let hint = self.hint;
         if !self.complaints.is_empty() {
-            return self.complaints.join("; ");
+            return format!("{}{hint}", self.complaints.join("; "));
         }
         let heard = if self.damaged > 0 { " (damaged bytes received)" } else { "" };
-        format!("no node answers on {:?}{heard}", self.path)
+        format!("no node answers on {:?}{heard}{hint}", self.path)
     }
 }
 
@@ -239,35 +251,72 @@ fn out_of_time(node: NodeId) -> String {
 /// READs of an id on a slow line until it counts as silent.
 const PATIENT_ATTEMPTS: u8 = 3;
 
-/// Tells the ids of the whole answers in a stream.
-type Ids = Box<dyn FnMut(&[u8], &mut NodeSet)>;
+/// What is heard on a line, whenever it comes.
+#[derive(Clone, Copy, Default)]
+struct Heard {
+    /// The ids of whole answers.
+    nodes: NodeSet,
+    /// Whether boards of the other kind answer.
+    others: bool,
+    /// Whether there are whole requests.
+    requests: bool,
+}
 
-macro_rules! ids_of {
-    ($decoder:expr) => {{
-        let mut decoder = $decoder;
-        Box::new(move |mut bytes, nodes| {
+impl Heard {
+    /// What these bytes mean that are no answers, for the end of a complaint.
+    const fn hint(self, protocol: Protocol) -> &'static str {
+        match (self.others, self.requests, protocol) {
+            (true, _, Protocol::Ikeya3) => "; boards with one motor answer: use --protocol ikeya",
+            (true, _, _) => "; boards with three motors answer: use --protocol ikeya-3",
+            (_, true, _) => {
+                "; requests are heard: use --echo if the adapter hears itself, and stop any other \
+                 program on this line"
+            }
+            _ => "",
+        }
+    }
+}
+
+/// Tells of each whole frame in a stream.
+type Tell = Box<dyn FnMut(&[u8], &mut Heard)>;
+
+macro_rules! tell {
+    ($decoder:ty, |$heard:ident, $frame:ident| $told:expr) => {{
+        let mut decoder = <$decoder>::new();
+        Box::new(move |mut bytes: &[u8], $heard: &mut Heard| {
             while let Some(event) = decoder.decode(&mut bytes) {
-                if let Found::Frame(answer) = event {
-                    nodes.insert(answer.id());
+                if let Found::Frame($frame) = event {
+                    $told;
                 }
             }
         })
     }};
 }
 
-/// The ids of all whole answers on this line, whenever they come.
-fn heard_on(line: Line, protocol: Protocol) -> (Rc<Cell<NodeSet>>, Line) {
-    let mut ids: Ids = match protocol {
-        Protocol::Ikeya3 => ids_of!(three::Decoder::<three::ToMaster>::new()),
-        _ => ids_of!(ikeya::Decoder::<ikeya::ToMaster>::new()),
+/// Whatever is heard on this line.
+fn heard_on(line: Line, protocol: Protocol) -> (Rc<Cell<Heard>>, Line) {
+    type One = ikeya::Decoder<ikeya::ToMaster>;
+    type Three = three::Decoder<three::ToMaster>;
+    let answers: [Tell; 2] = match protocol {
+        Protocol::Ikeya3 => [
+            tell!(Three, |heard, answer| heard.nodes.insert(answer.id())),
+            tell!(One, |heard, _answer| heard.others = true),
+        ],
+        _ => [
+            tell!(One, |heard, answer| heard.nodes.insert(answer.id())),
+            tell!(Three, |heard, _answer| heard.others = true),
+        ],
     };
-    let heard = Rc::new(Cell::new(NodeSet::NONE));
+    let requests: Tell =
+        tell!(ikeya::Decoder<ikeya::ToSlave>, |heard, _request| heard.requests = true);
+    let mut all = answers.into_iter().chain([requests]).collect::<Vec<_>>();
+    let heard = Rc::new(Cell::new(Heard::default()));
     let tapped = Rc::clone(&heard);
     let line = line.tapped(move |direction, bytes| {
         if direction == Direction::In {
-            let mut nodes = tapped.get();
-            ids(bytes, &mut nodes);
-            tapped.set(nodes);
+            let mut now = tapped.get();
+            all.iter_mut().for_each(|tell| tell(bytes, &mut now));
+            tapped.set(now);
         }
     });
     (heard, line)
@@ -285,38 +334,23 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let failure = if is_patient { bus.stop(nodes) } else { bus.stop_in_time(nodes) }.err();
     let too_short = bus.master().config().reply_timeout;
     let mut stopped = Stopped { path: bus.path().to_owned(), failure, ..Stopped::default() };
+    let mut needs = None;
     if !is_patient && bus.could_wait_longer() {
         let damaged = bus.may_be_there();
         // What comes now is too late for an answer, but tells which ids are there.
         stopped.failure = bus.leave_alone().err();
-        let known = heard.get();
-        let (first, rest): (Vec<_>, Vec<_>) =
-            nodes.iter().partition(|node| (known | damaged).contains(*node));
-        let mut needs = None;
+        bus.begin_now(nodes, PATIENT_ATTEMPTS);
         // First those whose motors are known to be there.
-        for (place, nodes) in [first, rest].into_iter().enumerate() {
-            let nodes: NodeSet = nodes.into_iter().collect();
-            match (nodes.is_empty(), place) {
-                (true, _) => continue,
-                (_, 0) => bus.begin_now(nodes, PATIENT_ATTEMPTS),
-                _ => bus.begin_patiently(nodes, PATIENT_ATTEMPTS),
-            }
-            stopped.failure = bus.stop(nodes).err().or(stopped.failure);
-            stopped.judge_each(args, &bus, nodes, heard.get());
-            needs = needs.max(bus.needed_patience());
-        }
-        if let Some(patience) = needs.filter(|it| it.config().reply_timeout > too_short) {
-            eprintln!(
-                "axle: answers come late: others need --reply-timeout {patience} on this line"
-            );
-        }
-    } else {
-        stopped.judge_each(args, &bus, nodes, heard.get());
+        let known = heard.get().nodes | damaged;
+        let first = nodes.iter().filter(|node| known.contains(*node)).collect();
+        stopped.failure = bus.stop_all_but_first(first).err().or(stopped.failure);
+        needs = bus.needed_patience().filter(|it| it.config().reply_timeout > too_short);
     }
-    // An answer may have come since.
     let heard = heard.get();
-    for node in stopped.silent.extract_if(.., |node| heard.contains(*node)) {
-        stopped.complaints.push(out_of_time(node));
+    stopped.judge_each(args, &bus, heard.nodes);
+    (stopped.others, stopped.hint) = (heard.others, heard.hint(B::PROTOCOL));
+    if let Some(patience) = needs.filter(|_| stopped.complaints.is_empty()) {
+        eprintln!("axle: answers come late: others need --reply-timeout {patience} on this line");
     }
     if stopped.answered > 0 && !stopped.silent.is_empty() {
         tell(args, &Event::Silent { nodes: stopped.silent.clone() });

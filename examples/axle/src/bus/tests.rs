@@ -65,14 +65,15 @@ fn only_a_line_that_takes_no_time_may_answer_early() {
 #[test]
 fn a_stop_that_is_owed_is_told_with_what_was_heard() {
     let cases = [
-        (true, Some(Cause::Damaged), ""),
-        (false, Some(Cause::Damaged), " (damaged bytes received)"),
-        (false, Some(Cause::Unexpected), " (other answers received)"),
-        (false, Some(Cause::Silent), " (nothing received)"),
-        (false, None, " (nothing received)"),
+        (true, true, Some(Cause::Damaged), ""),
+        (false, false, Some(Cause::Damaged), " (damaged bytes received)"),
+        (false, false, Some(Cause::Unexpected), " (other answers received)"),
+        (false, false, Some(Cause::Silent), " (nothing received)"),
+        (false, true, Some(Cause::Silent), " (its answers come too late)"),
+        (false, false, None, " (nothing received)"),
     ];
-    for (is_online, failure, expected) in cases {
-        assert_eq!(heard(is_online, failure), expected);
+    for (is_online, is_late, failure, expected) in cases {
+        assert_eq!(heard(is_online, is_late, failure), expected);
     }
 }
 

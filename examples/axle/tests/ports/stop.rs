@@ -71,6 +71,10 @@ fn on_a_line_with_echo_silent_ids_are_silent() {
     let (_sim, port) = sim("ikeya --node 1:velocity --echo");
     let lines = Process::start(&format!("stop -p {port} -P ikeya --echo")).success();
     assert_eq!(lines[1..], ["silent, not stopped: 2, 3, 4, 5, 6, 7, 8"]);
+    let complaint = Process::start(&format!("stop -p {port} -P ikeya")).complaint(1);
+    let hint = "; requests are heard: use --echo if the adapter hears itself, and stop any other \
+                program on this line";
+    assert!(complaint.ends_with(hint), "{complaint}");
 }
 
 #[test]
@@ -237,15 +241,14 @@ fn a_rover_that_turns_on_the_spot_is_not_called_stopped() {
     assert!(complaint.ends_with("but its wheels are still turning"), "{complaint}");
 }
 
-#[test]
-fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
+/// Node 3 with three motors that turn, and the speeds that it is told.
+fn three_motors() -> PlayedLine<Vec<[f32; 3]>> {
     let start = Instant::now();
     let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);
-    let id = NodeId::new(3).unwrap();
-    let mut slave =
-        Slave::<ThreeMotors>::for_board(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
+    let config = SlaveConfig::usb_adapter();
+    let mut slave = Slave::<ThreeMotors>::for_board(NodeId::N3, Mode::Velocity, config, now());
     slave.set_velocity([Rps::new(2.0).unwrap(); 3]);
-    let line = played::PlayedLine::new(Vec::new(), move |told, bytes| {
+    PlayedLine::new(Vec::new(), move |told, bytes| {
         slave.handle_input(bytes, now());
         while let Some(event) = slave.poll_event() {
             if let SlaveEvent::Command(Target::Velocity(speeds)) = event {
@@ -254,11 +257,31 @@ fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
             }
         }
         slave.poll_transmit(now()).map(<[u8]>::to_vec).unwrap_or_default()
-    });
-    let lines = Process::start(&format!("stop --port {} --protocol ikeya-3", line.path)).success();
-    assert_eq!(lines[0], "node 3: 0.00 0.00 0.00 rps, stopped and confirmed");
-    let told = line.lock();
-    assert!(told.len() >= 2 && told.iter().all(|speeds| *speeds == [0.0; 3]), "{told:?}");
+    })
+}
+
+#[test]
+fn boards_with_three_motors_are_stopped_with_and_without_their_protocol() {
+    for protocol in [" --protocol ikeya-3", ""] {
+        let line = three_motors();
+        let lines = Process::start(&format!("stop --port {}{protocol}", line.path)).success();
+        assert_eq!(lines[0], "node 3: 0.00 0.00 0.00 rps, stopped and confirmed");
+        let told = line.lock();
+        assert!(told.len() >= 2 && told.iter().all(|speeds| *speeds == [0.0; 3]), "{told:?}");
+    }
+}
+
+#[test]
+fn boards_of_the_other_kind_are_named_with_their_protocol() {
+    let three = three_motors();
+    let (_sim, one) = sim("ikeya --node 1:velocity");
+    for (path, asked, hint) in [
+        (&*three.path, "ikeya", "; boards with three motors answer: use --protocol ikeya-3"),
+        (&*one, "ikeya-3", "; boards with one motor answer: use --protocol ikeya"),
+    ] {
+        let complaint = Process::start(&format!("stop -p {path} -P {asked}")).complaint(1);
+        assert!(complaint.ends_with(hint), "{complaint}");
+    }
 }
 
 #[test]
@@ -353,7 +376,7 @@ fn turning(after: impl Fn(NodeId, u32) -> Option<f64> + Send + 'static) -> Playe
 }
 
 #[test]
-fn whoever_has_answered_during_a_stop_is_at_rest_or_a_failure() {
+fn a_node_that_has_answered_during_a_stop_is_at_rest_or_a_failure() {
     // Node 2 answers late, and node 1 once, very late.
     let line = turning(|node, asked| match node {
         NodeId::N2 => Some(0.1),
@@ -361,8 +384,9 @@ fn whoever_has_answered_during_a_stop_is_at_rest_or_a_failure() {
         _ => None,
     });
     let stop = Process::start(&format!("stop -p {} -P ikeya", line.path)).end();
-    let says = "axle: node 1 has answered, but not when it was asked: its motor may be moving";
-    assert_eq!((stop.code, stop.stderr.last().map(|it| &**it)), (Some(1), Some(says)), "{stop:?}");
+    assert_eq!((stop.code, stop.stdout.len()), (Some(1), 2), "{stop:?}");
+    let complaint = stop.stderr.last().unwrap();
+    assert!(complaint.contains("id 1 gives only answers that are too late"), "{stop:?}");
     // Node 8 answers its last READ alone.
     let line = turning(|node, asked| match node {
         NodeId::N1 => Some(0.2),
@@ -373,4 +397,29 @@ fn whoever_has_answered_during_a_stop_is_at_rest_or_a_failure() {
     let is_at_rest = line.lock().rps[7] == Rps::ZERO;
     assert!(stop.code == Some(1) || is_at_rest, "{stop:?}");
     assert!(stop.stdout.iter().any(|line| line.starts_with("node 8: ")), "{stop:?}");
+}
+
+#[test]
+fn nodes_that_answer_do_not_turn_on_while_another_one_is_waited_for() {
+    // All answer late. Node 3 does so once, and is then silent.
+    let line = turning(|node, asked| (node != NodeId::N3 || asked == 1).then_some(0.04));
+    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path));
+    let begin = Instant::now();
+    let are_stopped = || {
+        let rps = line.lock().rps;
+        NodeId::ALL.iter().zip(rps).all(|(node, rps)| *node == NodeId::N3 || rps == Rps::ZERO)
+    };
+    wait_until("the stops of seven nodes", are_stopped);
+    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+    stop.kill();
+}
+
+#[test]
+fn a_node_whose_answers_come_late_after_one_in_time_is_stopped_all_the_same() {
+    let line =
+        turning(|node, asked| (node == NodeId::N5).then_some(if asked == 1 { 0.0 } else { 0.06 }));
+    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path)).end();
+    assert_eq!(stop.code, Some(0), "{stop:?}");
+    assert_eq!(stop.stdout[0], "node 5: 0.00 rps, stopped and confirmed");
+    assert!(stop.stderr[0].contains("--reply-timeout network"), "{stop:?}");
 }
