@@ -10,17 +10,15 @@ cd "$(dirname "$0")/../.."
 # Cortex-M0, M3, M4F and M7, M33, RISC-V.
 cores=${CORES:-thumbv6m-none-eabi thumbv7m-none-eabi thumbv7em-none-eabihf thumbv8m.main-none-eabihf
     riscv32imc-unknown-none-elf}
-export CARGO_PROFILE_RELEASE_PANIC=abort CARGO_PROFILE_RELEASE_OPT_LEVEL=s \
-    CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1
 version=$(cargo pkgid --manifest-path examples/c/Cargo.toml)
 name=axlewire-${version##*@}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/$name"
 for core in $cores; do
-    bash .ci/cross "$core" rustc --quiet --release -p axlewire-c --no-default-features \
-        --crate-type staticlib
-    built=$(find "${CARGO_TARGET_DIR:-target}" -path "*$core/release/libaxlewire_c.a" | head -1)
+    bash .ci/cross "$core" rustc --quiet --profile firmware -p axlewire-c \
+        --no-default-features --crate-type staticlib
+    built=$(find "${CARGO_TARGET_DIR:-target}" -path "*$core/firmware/libaxlewire_c.a" | head -1)
     mkdir -p "$work/$name/lib/$core"
     cp "$built" "$work/$name/lib/$core/libaxlewire.a"
 done

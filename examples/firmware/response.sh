@@ -5,6 +5,8 @@
 #   examples/firmware/response.sh ikeya_slave   READ, answered by a velocity response
 #   examples/firmware/response.sh ucp_robot     ping, answered by a pong
 #
+# A second argument is the image of another program that does the same, and says nothing.
+#
 # QEMU executes and logs single instructions, interrupts and register accesses. Its USART takes a
 # line of text in one interrupt, so the maximum is larger than on a board.
 set -euo pipefail
@@ -18,7 +20,7 @@ ucp_robot) request='\xFD \xFF \x04 \x00 \x01 \x00 \x01 \x42' answer=fdff050001 ;
 *) sed -n '5,6s/^# \?//p' "$0" >&2; exit 2 ;;
 esac
 read -ra request <<<"$request"
-image=$(./run.sh --build "$1")
+image=${2:-$(./run.sh --build "$1")}
 one_by_one=(-accel tcg,one-insn-per-tb=on)
 qemu-system-arm --version | grep -q 'version [1-7]\.' && one_by_one=(-singlestep)
 
@@ -52,7 +54,7 @@ stty -F "$port" raw -echo
 cat <&"$bus" >"$folder/answers" 2>/dev/null &
 
 # The first line shows that it runs; QEMU sees the open port after a second, and then another comes.
-for _ in 1 2 3; do read -r -t 20 -u "$lines" line; done
+if [ $# = 1 ]; then for _ in 1 2 3; do read -r -t 20 -u "$lines" line; done; else sleep 3; fi
 answered() { od -An -v -tx1 "$folder/answers" | tr -d ' \n' | { grep -o "$answer" || true; } | wc -l; }
 have=0
 # A request delayed too long by this machine does not count, so up to twice as many are sent.

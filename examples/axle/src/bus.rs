@@ -458,8 +458,7 @@ impl<B: Boards> Bus<B> {
         let time = |bus: &Self| bus.session.awake() - begin;
         // Until each id has been asked as often as it is to be, if the port works.
         let window = span(self.master().config().reply_timeout);
-        let asking =
-            self.stop_patience().max(window * (u32::from(attempts) * nodes.len() as u32 + 1));
+        let asking = STOP_PATIENCE.max(window * (2 * u32::from(attempts) * nodes.len() as u32 + 1));
         let silence = if attempts > 1 { SILENCE } else { Span::ZERO };
         while self.heard(nodes) != nodes
             && time(self) < asking

@@ -24,7 +24,8 @@
 
 UART_HandleTypeDef huart1;
 
-extern uint32_t data_from[], data_begin[], data_end[], bss_begin[], bss_end[], stack_top[];
+extern uint32_t data_from[], data_begin[], data_end[], bss_begin[], bss_end[];
+extern void stack_top(void); /* only its address counts */
 
 int HAL_IsEmulated(void) { return (RCC_CR & 2) == 0; /* no internal oscillator */ }
 
@@ -87,6 +88,6 @@ static void fault(void) {
 
 #define SYSTEM_VECTORS 16
 __attribute__((section(".vectors"), used)) static void (*const vectors[])(void) = {
-    (void (*)(void))stack_top, reset, fault, fault, fault, fault, fault,
+    stack_top, reset, fault, fault, fault, fault, fault,
     [SYSTEM_VECTORS + USART1_IRQ] = usart1_interrupt,
 };

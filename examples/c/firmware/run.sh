@@ -2,8 +2,9 @@
 # Builds the motor node for an STM32F405 and runs it in QEMU: run.sh [COMMAND ..]
 #
 # Without a command it runs until Ctrl-C, on a pseudo-terminal whose name it prints. With one it runs
-# while the command does; PORT in it is that pseudo-terminal. CC names the compiler, clang or
-# arm-none-eabi-gcc; LIB the library, if it is built already. The image is left in target/c-node.elf.
+# while the command does; PORT in it is that pseudo-terminal. With --build it only builds, and prints
+# the name of the image. CC names the compiler, clang or arm-none-eabi-gcc; LIB the library, if it is
+# built already; TWIN=yes takes the node in Rust, to compare.
 set -euo pipefail
 from=$PWD
 cd "$(dirname "$0")"
@@ -11,24 +12,31 @@ root=$(cd ../../.. && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
 [ -d "$target" ] || target=$PWD
 core=thumbv7em-none-eabihf
-if [ -z "${LIB-}" ]; then
-    export CARGO_PROFILE_RELEASE_PANIC=abort CARGO_PROFILE_RELEASE_OPT_LEVEL=s \
-        CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1
-    (cd "$root" && bash .ci/cross $core rustc --quiet --release -p axlewire-c --no-default-features \
-        --crate-type staticlib)
-    LIB=$(find "$target" -path "*$core/release/libaxlewire_c.a" | head -1)
+name=c-node sources=(node.c hal.c)
+if [ -n "${TWIN-}" ]; then name=c-twin sources=(hal.c); fi
+build() (
+    cd "$1"; shift
+    bash "$root/.ci/cross" $core rustc --quiet "$@" --crate-type staticlib >&2
+)
+if [ -n "${TWIN-}" ]; then
+    CARGO_TARGET_DIR=$target/twin build twin --release
+    LIB=$(find "$target/twin" -path "*$core/release/libaxlewire_c_twin.a" | head -1)
+elif [ -z "${LIB-}" ]; then
+    build "$root" --profile firmware -p axlewire-c --no-default-features
+    LIB=$(find "$target" -path "*$core/firmware/libaxlewire_c.a" | head -1)
 fi
 CC=${CC:-clang}
 case $CC in
 *clang*) machine=(--target=$core -fuse-ld=lld) ;;
 *) machine=(-mthumb) ;;
 esac
-image=$target/c-node.elf
+image=$target/$name.elf
 "$CC" "${machine[@]}" -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -std=c99 -Os \
     -Wall -Wextra -Wpedantic -Wconversion -Werror -ffreestanding -ffunction-sections -fdata-sections \
-    -nostdlib -Wl,--gc-sections -T stm32f405.ld -I../include node.c hal.c "$LIB" -o "$image"
+    -nostdlib -Wl,--gc-sections -T stm32f405.ld -I../include "${sources[@]}" "$LIB" -o "$image"
 # A panic that could happen would be linked.
 if nm "$image" | grep -i 'panic\|unwind'; then echo "the node can panic" >&2; exit 1; fi
+if [ "${1-}" = --build ]; then echo "$image"; exit; fi
 
 exec {lines}< <(exec setsid qemu-system-arm -M netduinoplus2 -display none -monitor none \
     -serial pty -kernel "$image" </dev/null 2>&1)

@@ -1,0 +1,130 @@
+//! The node of `node.c` in Rust, on the same stand-in for ST's HAL: the same calls in the same
+//! order, without the border to C.
+#![no_std]
+#![allow(missing_docs, non_snake_case)]
+
+use core::{
+    ffi::c_int,
+    sync::atomic::{AtomicU16, Ordering},
+};
+
+use axlewire::{
+    endpoint::{Endpoint, Transmit, Unsent},
+    ikeya::{Mode, NodeId, Rps, Slave, Target, slave::SlaveConfig},
+    time::{Duration, Instant, Wrapping32},
+};
+use panic_halt as _;
+
+const STEP: Duration = Duration::from_millis(1);
+const DRIVER_ENABLE: u16 = 8;
+const SIZE: usize = 256;
+
+#[repr(C)]
+pub struct Uart {
+    _private: [u32; 2],
+}
+
+unsafe extern "C" {
+    static mut huart1: Uart;
+    fn HAL_Init() -> c_int;
+    fn HAL_UARTEx_ReceiveToIdle_DMA(uart: *mut Uart, to: *mut u8, size: u16) -> c_int;
+    fn HAL_UART_Transmit(uart: *mut Uart, from: *const u8, size: u16, timeout_ms: u32) -> c_int;
+    fn HAL_GPIO_WritePin(pin: u16, state: c_int);
+    fn HAL_Micros() -> u32;
+    fn HAL_IsEmulated() -> c_int;
+}
+
+static mut RING: [u8; SIZE] = [0; SIZE];
+static FILLED: AtomicU16 = AtomicU16::new(0);
+
+#[unsafe(no_mangle)]
+pub extern "C" fn HAL_UARTEx_RxEventCallback(_: *mut Uart, size: u16) {
+    FILLED.store(size % SIZE as u16, Ordering::Relaxed);
+}
+
+struct Node {
+    slave: Slave,
+    timer: Wrapping32,
+    taken: usize,
+    rps: f32,
+}
+
+impl Node {
+    fn now(&mut self) -> Instant {
+        // SAFETY: reads a register.
+        self.timer.at(unsafe { HAL_Micros() })
+    }
+
+    fn receive(&mut self) {
+        let empty_at = self.now();
+        let end = usize::from(FILLED.load(Ordering::Relaxed));
+        // SAFETY: DMA writes elsewhere in the ring.
+        let ring: &[u8; SIZE] = unsafe { &*&raw const RING };
+        if end < self.taken {
+            let now = self.now();
+            self.slave.handle_input(ring.get(self.taken..).unwrap_or_default(), now);
+            self.taken = 0;
+        }
+        let now = self.now();
+        self.slave.handle_input(ring.get(self.taken..end).unwrap_or_default(), now);
+        self.taken = end;
+        self.slave.handle_timeout(empty_at);
+    }
+
+    fn answer(&mut self) {
+        loop {
+            let now = self.now();
+            let Some(frame) = self.slave.poll_transmit(now) else { return };
+            // SAFETY: writes a register.
+            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE, 1) };
+            // SAFETY: the frame stays where it is during the call.
+            let sent = unsafe {
+                HAL_UART_Transmit(&raw mut huart1, frame.as_ptr(), frame.len() as u16, 2)
+            };
+            if sent != 0 {
+                let now = self.now();
+                self.slave.handle_transmit(Transmit::Unsent(Unsent::CutOff), now);
+            }
+            // SAFETY: writes a register.
+            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE, 0) };
+        }
+    }
+
+    fn turn(&mut self, now: Instant) {
+        let speed = match self.slave.command(now) {
+            Some(Target::Velocity(speed)) => speed.get(),
+            _ => 0.0,
+        };
+        self.rps += (speed - self.rps) / 16.0;
+        let is_still = self.rps > -1e-3 && self.rps < 1e-3;
+        self.slave.set_velocity(Rps::new(if is_still { 0.0 } else { self.rps }).unwrap_or_default());
+    }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn main() -> c_int {
+    // SAFETY: each function of the HAL is called as its description says.
+    let is_emulated = unsafe {
+        HAL_Init();
+        HAL_IsEmulated() != 0
+    };
+    let mut config = if is_emulated { SlaveConfig::usb_adapter() } else { SlaveConfig::direct() };
+    config.watchdog = Some(Duration::from_millis(500));
+    let timer = Wrapping32::new();
+    // SAFETY: reads a register.
+    let begin = timer.at(unsafe { HAL_Micros() });
+    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, begin);
+    let mut node = Node { slave, timer, taken: 0, rps: 0.0 };
+    // SAFETY: the ring stays where it is.
+    unsafe { HAL_UARTEx_ReceiveToIdle_DMA(&raw mut huart1, (&raw mut RING).cast(), SIZE as u16) };
+    let mut step_at = node.now();
+    loop {
+        node.receive();
+        node.answer();
+        if node.now() < step_at {
+            continue;
+        }
+        node.turn(step_at);
+        step_at += STEP;
+    }
+}
