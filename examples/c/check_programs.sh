@@ -24,6 +24,7 @@ build() {
     [ "$c" = gcc ] || cxx=clang++
     mkdir -p "$into"
     $c -std=c"$of_c" "${strict[@]}" "$@" bus_master.c "${library[@]}" -o "$into/bus_master"
+    $c -std=c"$of_c" "${strict[@]}" "$@" usual.c "${library[@]}" -o "$into/usual"
     for program in rover_host classes; do
         $cxx -std=c++"$of_cxx" -fno-exceptions -fno-rtti "${strict[@]}" "$@" $program.cpp \
             "${library[@]}" -o "$into/$program"
@@ -60,6 +61,7 @@ run() {
     local from=$work/$1; shift
     echo "== ${from##*/} $*"
     "$@" "$from/classes"
+    [ $# -gt 0 ] || "$from/usual" >"$work/log"
     simulate ikeya --node 1:velocity --node 6:position
     "$@" "$from/bus_master" "$work/line" 1 1.5 | tail -1
     "$@" "$from/run_component" "$work/line" 1 | tail -1
