@@ -148,4 +148,11 @@ cmake --build "$work/fetched" >"$work/log"
 flags=$(PKG_CONFIG_PATH=$work/out/lib/pkgconfig pkg-config --cflags --libs axlewire)
 # Split into words on purpose.
 gcc bus_master.c $flags -o "$work/by-pkg-config"
+if command -v cargo-cinstall >/dev/null; then
+    cargo cinstall --quiet --release -p axlewire-c --target-dir "$target/capi" --prefix "$work/shared" \
+        --libdir lib >"$work/log" 2>&1
+    flags=$(PKG_CONFIG_PATH=$work/shared/lib/pkgconfig pkg-config --cflags --libs axlewire)
+    gcc usual.c $flags -o "$work/by-cargo-c"
+    LD_LIBRARY_PATH=$work/shared/lib "$work/by-cargo-c" >"$work/log"
+fi
 echo "all programs do what they say"
