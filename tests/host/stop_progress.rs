@@ -269,3 +269,69 @@ fn a_report_that_false_headers_held_back_counts_however_small_the_chunks() {
         assert_eq!(last, StandingStill, "{chunk}");
     }
 }
+
+/// When a stop at 190 ms is seen, milliseconds, if the reports pause from 200 ms on, with index 4
+/// the last, and go on with this one.
+fn seen_after_a_pause(pause_ms: u64, index: u8) -> u64 {
+    let mut host = driven(measured(), 40, 20);
+    wait(&mut host, ms(20));
+    let report = |host: &mut Host, index: u8, at: u64| {
+        let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
+        host.handle_input(report.as_bytes(), ms(at));
+    };
+    (0..5).for_each(|index| report(&mut host, index, 100 + 20 * u64::from(index)));
+    host.stop(ms(190));
+    (190..195).for_each(|at| drop(sent(&mut host, ms(at))));
+    report(&mut host, 5, 200);
+    let times = (220 + pause_ms..9000).step_by(20);
+    let mut indices = (0..=u8::MAX).cycle().skip(index.into());
+    let mut seen = times.zip(&mut indices).filter(|&(at, index)| {
+        host.handle_timeout(ms(at));
+        report(&mut host, index, at);
+        sent(&mut host, ms(at));
+        host.stop_progress() == StandingStill
+    });
+    seen.next().unwrap().0
+}
+
+#[test]
+fn a_robot_that_may_have_restarted_stands_still_only_once_it_has_had_the_time_to_coast() {
+    for (pause_ms, index, has_restarted) in [
+        (0, 6, false),
+        (60, 0, false),
+        (400, 26, false),
+        (400, 6, false),
+        (400, 0, true),
+        (400, 60, true),
+        (800, 46, false),
+        (800, 0, true),
+    ] {
+        let first = 220 + pause_ms;
+        // The second and third in a row; all three if nothing counts that was before.
+        let expected = if has_restarted { first + COAST.as_millis() as u64 } else { first + 20 };
+        let seen = seen_after_a_pause(pause_ms, index);
+        assert!((expected..=expected + 60).contains(&seen), "{pause_ms} {index}: {seen}");
+    }
+}
+
+#[test]
+fn nothing_is_known_of_a_robot_whose_link_was_lost() {
+    let mut config = quiet_config();
+    config.rpm_average = Duration::ZERO;
+    let mut host = Host::new(config, ms(0));
+    host.stop(ms(0));
+    let mut progress = |at: u64, is_heard: bool| {
+        host.handle_timeout(ms(at));
+        sent(&mut host, ms(at));
+        if is_heard {
+            let report = FirmwareReport::new(&Telemetry::default(), 38).frame((at / 20) as u8);
+            host.handle_input(report.as_bytes(), ms(at));
+        }
+        host.stop_progress()
+    };
+    let before = (0..300).step_by(20).map(|at| progress(at, true)).last();
+    assert_eq!(before, Some(StandingStill));
+    assert_eq!((300..1000).step_by(20).map(|at| progress(at, false)).last(), Some(NoReports));
+    let back = (1000..9000).step_by(20).find(|&at| progress(at, true) == StandingStill);
+    assert_eq!(back, Some(1000 + u64::from(COAST.as_millis())));
+}

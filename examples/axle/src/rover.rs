@@ -214,6 +214,9 @@ impl Rover {
         let sent = self.host().statistics().commands.saturating_sub(before);
         let told = format!("the robot was told {sent} times to stop");
         Err(Failure::Failed(match (self.host().link(), self.host().stop_progress()) {
+            (Link::Up, StopProgress::StillMoving { rpm: [0, 0, 0, 0] }) => {
+                format!("{told}, but its reports do not show yet that it stands still")
+            }
             (Link::Up, StopProgress::StillMoving { .. }) => {
                 format!("{told}, but its wheels are still turning")
             }

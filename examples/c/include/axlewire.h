@@ -319,7 +319,7 @@
 #define AXLE_UCP_STOP_STANDING_STILL 4
 
 /// Size of the object, bytes.
-#define AXLE_UCP_HOST_SIZE 1960
+#define AXLE_UCP_HOST_SIZE 1976
 
 /// Time after a stop in which a rover is seen to stand still, microseconds: 2 s to coast, and one
 /// more until the average that it reports shows it.
@@ -796,7 +796,7 @@ typedef struct axle_ucp_host_config {
 /// The host of a rover, which keeps its biases.
 typedef struct axle_ucp_host {
   /// Private.
-  uint64_t memory[245];
+  uint64_t memory[247];
 } axle_ucp_host;
 
 /// What a robot measures (ruling U5).

@@ -12,6 +12,12 @@ pub const COAST: Duration = Duration::from_secs(3);
 /// are just reversing.
 pub const STILL_REPORTS: u8 = 3;
 
+/// Pause between two reports in which a robot may have restarted.
+const SHORTEST_RESTART: Duration = Duration::from_millis(100);
+
+/// Shortest time between two reports of a robot: vendor robots report every 20 ms.
+const SHORTEST_PERIOD: Duration = Duration::from_millis(16);
+
 /// Fastest turn of a wheel that stands still, rpm.
 const STILL_RPM: u16 = 2;
 
@@ -34,7 +40,9 @@ pub enum StopProgress {
         rpm: [i16; 4],
     },
     /// The latest three reports, all received since, show every wheel at 2 rpm or less, and the
-    /// last of them is an average of the time since.
+    /// last of them is an average of the time since. If the robot may have restarted since (its
+    /// reports paused for 100 ms, and their index does not go on), it is one of [`COAST`] later: a
+    /// vendor robot then reports 0 until its next move.
     StandingStill,
 }
 
@@ -78,8 +86,17 @@ pub(super) struct Wheels {
     pub(super) on_line: Duration,
     /// Time of which its speeds are the average.
     pub(super) average: Duration,
+    /// From when on it shows a standstill: the wheels may coast until then, and show 0.
+    pub(super) shows_from: Instant,
     /// When it no longer says anything.
     pub(super) until: Instant,
+}
+
+/// Whether a robot may have restarted in this pause between two reports: the index goes back, or on
+/// by more than the pause holds, or nothing is known of it.
+pub(super) fn may_be_a_restart(pause: Duration, steps: Option<u8>) -> bool {
+    let is_more = |steps: u8| SHORTEST_PERIOD.saturating_mul(steps.into()) > pause;
+    pause >= SHORTEST_RESTART && steps.is_none_or(is_more)
 }
 
 /// Whether all wheels stand still: turning on the spot is also motion.
@@ -106,7 +123,8 @@ impl Standstill {
             _ => return,
         };
         // An average from before the stop may not show yet that the wheels turn.
-        let is_settled = wheels.at - told >= wheels.average + wheels.on_line;
+        let is_settled =
+            wheels.at - told >= wheels.average + wheels.on_line && wheels.at >= wheels.shows_from;
         let most = if is_settled { STILL_REPORTS } else { STILL_REPORTS - 1 };
         let still = if are_still(&wheels.rpm) { before.saturating_add(1).min(most) } else { 0 };
         *self = Self::Reported { told, rpm: wheels.rpm, still, until: wheels.until };

@@ -12,7 +12,7 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
-    standstill::{StopProgress, Wheels},
+    standstill::{COAST, StopProgress, Wheels, may_be_a_restart},
     statistics::HostStatistics,
     update::Update,
 };
@@ -57,6 +57,10 @@ pub(super) struct State<S> {
     pub(super) is_report_new: bool,
     /// Round trip of the latest pong, until it is taken.
     pub(super) new_round_trip: Option<Duration>,
+    /// When the latest report arrived, if there is one.
+    reported_at: Instant,
+    /// Until when the wheels of a robot that may have restarted may coast.
+    coasts_until: Instant,
     /// Index of the previous report, if there is one to count from.
     last_index: Option<u8>,
     pub(super) imu: Results<ImuBias>,
@@ -98,6 +102,8 @@ impl<S: BiasStore> State<S> {
             last_report: None,
             is_report_new: false,
             new_round_trip: None,
+            reported_at: now,
+            coasts_until: now,
             last_index: None,
             imu: Results::new(),
             mag: Results::new(),
@@ -274,23 +280,26 @@ impl<S: BiasStore> State<S> {
 
     fn report(&mut self, report: &Report<'_>, frame: &Frame, at: Instant) {
         let index = frame.index();
-        let lost = match self.last_index.replace(index) {
-            Some(last) if last == index => {
-                count(&mut self.stats.reports_repeated);
-                0
-            }
-            Some(last) => index.wrapping_sub(last).wrapping_sub(1),
-            None => 0,
-        };
+        let steps = self.last_index.replace(index).map(|last| index.wrapping_sub(last));
+        if steps == Some(0) {
+            count(&mut self.stats.reports_repeated);
+        }
+        let lost = steps.map_or(0, |steps| steps.saturating_sub(1));
         count(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
         let at = self.arrived_since.map_or(at, |since| at.min(since));
+        // A vendor robot that has restarted reports 0 until its next move, whatever its wheels do.
+        if self.stats.reports > 1 && may_be_a_restart(at - self.reported_at, steps) {
+            self.coasts_until = at + COAST;
+        }
+        self.reported_at = at;
         self.motor.standstill().report(&Wheels {
             rpm: report.telemetry.rpm,
             at,
             on_line: wire_time(frame.as_bytes().len(), self.config.baud),
             average: self.config.rpm_average,
+            shows_from: self.coasts_until,
             until: at + self.config.link_timeout,
         });
         (self.last_report, self.is_report_new) = (Some(report), true);

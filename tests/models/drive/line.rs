@@ -14,7 +14,7 @@ use crate::names::*;
 
 /// Most operations of the port, the pin and the clock in one call: far more than any call of these
 /// worlds needs.
-const OPERATIONS: u32 = 60_000;
+const OPERATIONS: u32 = 200_000;
 
 /// The receiver of what is sent.
 pub(crate) trait Peer {

@@ -466,7 +466,7 @@ fn statistics_of(host: &Host<MemoryStore>) -> axle_ucp_host_statistics {
 
 object! {
     /// The host of a rover, which keeps its biases.
-    axle_ucp_host, AXLE_UCP_HOST_SIZE = 1960, 245 words of Host<MemoryStore>, b"axHo"
+    axle_ucp_host, AXLE_UCP_HOST_SIZE = 1976, 247 words of Host<MemoryStore>, b"axHo"
 }
 
 /// Makes a host without biases. `size` is `sizeof *host`. Never call it during another call with
