@@ -6,6 +6,7 @@ set -euo pipefail
 out=${1:?"where to? build.sh OUT"}
 here=$(cd "$(dirname "$0")" && pwd)
 target=${CARGO_TARGET_DIR:-$here/../../target}
+unset CARGO_BUILD_TARGET
 crate=(--manifest-path "$here/Cargo.toml")
 
 # No panic may cross into C: it ends the program.

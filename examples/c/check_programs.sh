@@ -25,7 +25,7 @@ build() {
     mkdir -p "$into"
     $c -std=c"$of_c" "${strict[@]}" "$@" bus_master.c "${library[@]}" -o "$into/bus_master"
     $c -std=c"$of_c" "${strict[@]}" "$@" usual.c "${library[@]}" -o "$into/usual"
-    for program in rover_host classes; do
+    for program in bus_host rover_host classes; do
         $cxx -std=c++"$of_cxx" -fno-exceptions -fno-rtti "${strict[@]}" "$@" $program.cpp \
             "${library[@]}" -o "$into/$program"
     done
@@ -64,6 +64,8 @@ run() {
     [ $# -gt 0 ] || "$from/usual" >"$work/log"
     simulate ikeya --node 1:velocity --node 6:position
     "$@" "$from/bus_master" "$work/line" 1 1.5 | tail -1
+    "$@" "$from/bus_host" "$work/line" 1 6 | tail -1
+    must_fail "node is in the other mode" "$@" "$from/bus_host" "$work/line" 6 1
     "$@" "$from/run_component" "$work/line" 1 | tail -1
     must_fail "node 6: node is in the other mode" "$@" "$from/bus_master" "$work/line" 6 1.5
     finish
@@ -101,11 +103,19 @@ run sanitized
 run clang valgrind --quiet --error-exitcode=9 --leak-check=full \
     --suppressions="$here/programs/valgrind.supp"
 
+echo "== a port in use, bad settings, signals, endless times"
+g++ -std=c++17 "${strict[@]}" "${sanitized[@]}" "$here/tests/port.cpp" "${library[@]}" -o "$work/port"
+simulate ikeya --node 1:velocity
+"$work/port" "$work/line"
+finish
+
 echo "== the line goes away"
 simulate ikeya --node 1:velocity
 must_notice "node 1 may be moving" bus_master 1 1.5
 simulate ikeya --node 1:velocity
 must_notice "the joint may be moving" run_component 1
+simulate ikeya --node 1:velocity --node 6:position
+must_notice "a motor may be moving" bus_host 1 6
 simulate ucp
 must_notice "the rover may be moving" rover_host
 
@@ -149,7 +159,7 @@ flags=$(PKG_CONFIG_PATH=$work/out/lib/pkgconfig pkg-config --cflags --libs axlew
 # Split into words on purpose.
 gcc bus_master.c $flags -o "$work/by-pkg-config"
 if command -v cargo-cinstall >/dev/null; then
-    cargo cinstall --quiet --release -p axlewire-c --target-dir "$target/capi" --prefix "$work/shared" \
+    cargo cinstall --release -p axlewire-c --target-dir "$target/capi" --prefix "$work/shared" \
         --libdir lib >"$work/log" 2>&1
     flags=$(PKG_CONFIG_PATH=$work/shared/lib/pkgconfig pkg-config --cflags --libs axlewire)
     gcc usual.c $flags -o "$work/by-cargo-c"

@@ -22,7 +22,12 @@ for core in $cores; do
     mkdir -p "$work/$name/lib/$core"
     cp "$built" "$work/$name/lib/$core/libaxlewire.a"
 done
-cp -r examples/c/include examples/c/firmware LICENSE-* "$work/$name"
+cp -r examples/c/{include,firmware,README.md} LICENSE-* "$work/$name"
+rm -r "$work/$name/firmware/twin"
+mkdir "$work/$name/doc"
+cp src/safety.md src/guide/{ikeya,ucp}.md "$work/$name/doc"
+# The same pages, where they are in the zip; what else is named is in the repository.
+sed -i -E 's#\.\./\.\./src/(guide/)?(\w+\.md)#doc/\2#' "$work/$name/README.md"
 cd "$work"
 (cd "$name" && find . -type f ! -name SHA256SUMS -exec sha256sum {} + | sort -k2 >SHA256SUMS)
 python3 -m zipfile -c "$out" "$name"

@@ -13,10 +13,10 @@
 #define USART1_SR REGISTER(0x40011000)
 #define USART1_DR REGISTER(0x40011004)
 #define USART1_CR1 REGISTER(0x4001100C)
-#define GPIOA_BSRR REGISTER(0x40020018)
 #define NVIC_ISER1 REGISTER(0xE000E104)
 #define CPACR REGISTER(0xE000ED88)
 
+#define USART_ERRORS 0xEu /* framing, noise, overrun */
 #define USART_RXNE (1u << 5)
 #define USART_TC (1u << 6)
 #define USART_TXE (1u << 7)
@@ -40,8 +40,8 @@ HAL_StatusTypeDef HAL_Init(void) {
 
 uint32_t HAL_Micros(void) { return TIM2_CNT; }
 
-void HAL_GPIO_WritePin(uint16_t pin, GPIO_PinState state) {
-    GPIOA_BSRR = 1u << (state == GPIO_PIN_SET ? pin : pin + 16);
+void HAL_GPIO_WritePin(GPIO_TypeDef *port, uint16_t pin, GPIO_PinState state) {
+    port->BSRR = state == GPIO_PIN_SET ? pin : (uint32_t)pin << 16;
 }
 
 HAL_StatusTypeDef HAL_UARTEx_ReceiveToIdle_DMA(UART_HandleTypeDef *uart, uint8_t *to, uint16_t size) {
@@ -65,8 +65,14 @@ HAL_StatusTypeDef HAL_UART_Transmit(UART_HandleTypeDef *uart, const uint8_t *fro
 
 static void usart1_interrupt(void) {
     UART_HandleTypeDef *uart = &huart1;
-    if (!(USART1_SR & USART_RXNE)) return;
+    const uint32_t status = USART1_SR;
+    if (!(status & (USART_RXNE | USART_ERRORS))) return;
     const uint8_t byte = (uint8_t)USART1_DR;
+    if (status & USART_ERRORS) {
+        uart->pRxBuffPtr = 0;
+        HAL_UART_ErrorCallback(uart);
+        return;
+    }
     if (!uart->pRxBuffPtr) return;
     uart->pRxBuffPtr[uart->RxXferCount++] = byte;
     HAL_UARTEx_RxEventCallback(uart, uart->RxXferCount);

@@ -12,7 +12,9 @@
 static axle_ikeya_slave slave;
 static axle_clock32 since_start;
 static uint8_t ring[256];
+static uint16_t taken;
 static volatile uint16_t filled; /* DMA writes here next */
+static volatile uint8_t has_ended;
 
 static uint64_t now_us(void) { return axle_clock32_at(&since_start, HAL_Micros()); }
 
@@ -21,9 +23,19 @@ void HAL_UARTEx_RxEventCallback(UART_HandleTypeDef *uart, uint16_t size) {
     filled = size % sizeof ring;
 }
 
+/* The HAL has ended the reception: what the line damaged costs a packet, not the node. */
+void HAL_UART_ErrorCallback(UART_HandleTypeDef *uart) {
+    (void)uart;
+    has_ended = 1;
+}
+
+static void begin_to_receive(void) {
+    has_ended = 0, taken = 0, filled = 0;
+    HAL_UARTEx_ReceiveToIdle_DMA(&huart1, ring, sizeof ring);
+}
+
 /* Hands in what has come since the last call. */
 static void receive(void) {
-    static uint16_t taken;
     const uint64_t empty_at = now_us();
     const uint16_t end = filled;
     if (end < taken) {
@@ -33,6 +45,7 @@ static void receive(void) {
     axle_ikeya_slave_handle_input(&slave, ring + taken, (size_t)(end - taken), now_us());
     taken = end;
     axle_ikeya_slave_handle_timeout(&slave, empty_at);
+    if (has_ended) begin_to_receive();
 }
 
 /* Sends the answer, if one is due. The transceiver drives the line only meanwhile. */
@@ -40,10 +53,10 @@ static void answer(void) {
     const uint8_t *frame;
     size_t length;
     while (axle_ikeya_slave_poll_transmit(&slave, now_us(), &frame, &length) == AXLE_OK) {
-        HAL_GPIO_WritePin(DRIVER_ENABLE, GPIO_PIN_SET);
+        HAL_GPIO_WritePin(DRIVER_ENABLE_GPIO_Port, DRIVER_ENABLE_Pin, GPIO_PIN_SET);
         if (HAL_UART_Transmit(&huart1, frame, (uint16_t)length, 2) != HAL_OK)
             axle_ikeya_slave_handle_transmit(&slave, AXLE_TRANSMIT_CUT_OFF, now_us());
-        HAL_GPIO_WritePin(DRIVER_ENABLE, GPIO_PIN_RESET);
+        HAL_GPIO_WritePin(DRIVER_ENABLE_GPIO_Port, DRIVER_ENABLE_Pin, GPIO_PIN_RESET);
     }
 }
 
@@ -63,8 +76,9 @@ int main(void) {
     axle_ikeya_slave_config_direct(&config);
     if (HAL_IsEmulated()) axle_ikeya_slave_config_usb_adapter(&config);
     config.watchdog_us = 500000;
+    config.two_wire = 1; /* it hears the other nodes, too */
     axle_ikeya_slave_init(&slave, sizeof slave, NODE, AXLE_IKEYA_MODE_VELOCITY, &config, now_us());
-    HAL_UARTEx_ReceiveToIdle_DMA(&huart1, ring, sizeof ring);
+    begin_to_receive();
     for (uint64_t step_at = now_us();;) {
         receive();
         answer();

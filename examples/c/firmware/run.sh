@@ -21,6 +21,8 @@ build() (
 if [ -n "${TWIN-}" ]; then
     CARGO_TARGET_DIR=$target/twin build twin --release
     LIB=$(find "$target/twin" -path "*$core/release/libaxlewire_c_twin.a" | head -1)
+elif [ -z "${LIB-}" ] && [ -f ../lib/$core/libaxlewire.a ]; then # in the zip
+    LIB=../lib/$core/libaxlewire.a target=$PWD
 elif [ -z "${LIB-}" ]; then
     build "$root" --profile firmware -p axlewire-c --no-default-features
     LIB=$(find "$target" -path "*$core/firmware/libaxlewire_c.a" | head -1)
@@ -28,7 +30,7 @@ fi
 CC=${CC:-clang}
 case $CC in
 *clang*) machine=(--target=$core -fuse-ld=lld) ;;
-*) machine=(-mthumb) ;;
+*) machine=(-mthumb -Wl,--no-warn-execstack) ;;
 esac
 image=$target/$name.elf
 "$CC" "${machine[@]}" -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -std=c99 -Os \

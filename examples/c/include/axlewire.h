@@ -3,7 +3,7 @@
  * Objects live in your memory: declare one, and pass its address with its size to `_init`. All else
  * of an object is private. Nothing here allocates, blocks, calls back, reads a clock or keeps a
  * global. Use an object from one thread at a time; a call from an interrupt during another call is
- * refused with AXLE_ERROR_BUSY. Only `_init` is not: it begins anew, whatever the memory holds.
+ * refused with AXLE_ERROR_BUSY. `_init` is never refused: it begins anew, whatever the memory holds.
  *
  * Functions return AXLE_OK, AXLE_NONE, or a negative error, which has changed nothing. Pointers may
  * be null or unaligned, which gives an error; what they point to must be as long as said. Outputs
@@ -18,8 +18,22 @@
  *     while (axle_ikeya_master_poll_event(&master, &event) == AXLE_OK)
  *         act_on(&event);                  // give commands here
  *     while (axle_ikeya_master_poll_transmit(&master, now_us(), &frame, &length) == AXLE_OK)
- *         write_port(frame, length);       // whole; else tell axle_ikeya_master_handle_transmit
+ *         if (!write_port(frame, length)) {        // not whole: it is due again, later
+ *             axle_ikeya_master_handle_transmit(&master, AXLE_TRANSMIT_CUT_OFF, now_us());
+ *             break;
+ *         }
  *     wait_for_bytes_or(axle_ikeya_master_next_deadline(&master, &at_us));
+ *
+ * The loop of a decoder, here for a recording:
+ *
+ *     while ((left = read_file(bytes)) > 0)
+ *         for (data = bytes; axle_ikeya_decoder_decode(&decoder, &data, &left, &event) == AXLE_OK;)
+ *             act_on(&event);
+ *     do {
+ *         axle_ikeya_decoder_idle(&decoder);            // nothing follows
+ *         while (axle_ikeya_decoder_poll(&decoder, &event) == AXLE_OK) act_on(&event);
+ *         axle_ikeya_decoder_get_pending(&decoder, &left);
+ *     } while (left > 0);
  *
  * The rulings, such as I12, are explained in the documentation of axlewire, on the pages `ikeya`
  * and `ucp`. Before you connect a motor, read its page `safety`.
@@ -81,7 +95,8 @@
 /// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
 #define AXLE_IKEYA_MASTER_STILL_MOVING 12
 
-/// The same for a node that is owed a stop, which is not written: `node` (rulings I11, I12).
+/// The mode of a node that is owed a stop is still in doubt, so the stop is not written: `node`
+/// (rulings I11, I12).
 #define AXLE_IKEYA_MASTER_STOP_BLOCKED 13
 
 /// The dead-man has fired (ruling I13).
@@ -424,7 +439,8 @@
 /// Size of the object, bytes.
 #define AXLE_UCP_ROBOT_SIZE 1080
 
-/// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts.
+/// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts. Any
+/// values are a position, the sum of both parts: 2 turns and 8192 counts are 3 turns.
 typedef struct axle_ikeya_position {
   /// Whole turns.
   int16_t rotation;
@@ -448,24 +464,27 @@ typedef struct axle_ikeya_master_config {
   uint32_t reply_timeout_us;
   /// Time after a missed answer during which the node is not polled again.
   uint32_t late_guard_us;
-  /// Silence between a request or an answer and the next request, for transceivers that need it.
+  /// Silence between a request or an answer and the next request, for transceivers that need it;
+  /// 0 by default.
   uint32_t turnaround_gap_us;
-  /// Period in which each node is read, for `AXLE_IKEYA_POLLING_EVERY`.
+  /// Period in which each node is read, for `AXLE_IKEYA_POLLING_EVERY`; with 0, as fast as the
+  /// line allows.
   uint32_t polling_period_us;
-  /// Age of a measured position that a stop may hold; 0: always read (ruling I6).
+  /// Age of a measured position that a stop may hold; 0, the default: always read (ruling I6).
   uint32_t hold_age_us;
   /// Time in which a motor may come to rest after its stop is confirmed (ruling I12); 2 s.
   uint32_t coast_us;
   /// Time without a command or `keep_alive` after which every node under a set-point is owed a
-  /// stop (ruling I13); 0 switches it off.
+  /// stop (ruling I13); 0, the default, for none.
   uint32_t dead_man_us;
   /// Ids on this bus; all eight by default.
   axle_ikeya_node_set nodes;
-  /// One of `AXLE_IKEYA_POLLING_`.
+  /// One of `AXLE_IKEYA_POLLING_`; `AXLE_IKEYA_POLLING_FASTEST` by default.
   uint8_t polling;
-  /// Attempts of a READ before it has failed (ruling I8); 0 counts as 1.
+  /// Attempts of a READ before it has failed (ruling I8); 3 by default, 0 counts as 1.
   uint8_t attempts;
-  /// Share of line time for finding abnormal nodes, percent; more than 50 counts as 50 (I13).
+  /// Share of line time for finding abnormal nodes, percent; 5 by default, more than 50 counts
+  /// as 50 (I13).
   uint8_t recovery_share_pct;
   /// Not 0 if an answer may arrive before the line could have carried it, as behind a pipe, or
   /// if the clock is coarser than 20 us.
@@ -681,7 +700,8 @@ typedef struct axle_ikeya_slave_config {
   uint32_t idle_us;
   /// Time during which an answer may still be sent (ruling I14).
   uint32_t answer_within_us;
-  /// Not 0 if the slaves on this line hear each other, as on two wires (ruling I14).
+  /// Not 0 if the slaves on this line hear each other's answers, as on RS485 with one pair of
+  /// wires; 0, the default, on two pairs (ruling I14).
   uint8_t two_wire;
 } axle_ikeya_slave_config;
 
@@ -745,7 +765,8 @@ typedef struct axle_ucp_decoder {
 typedef struct axle_stream_event {
   /// One of `AXLE_STREAM_`.
   uint8_t kind;
-  /// Why the first byte of a gap begins no frame: one of `AXLE_REASON_`; 0 for a frame.
+  /// Why the first byte of a gap begins no frame: one of `AXLE_REASON_`; 0 for a frame. The
+  /// other bytes of the gap may have other reasons: the counters have them all.
   uint8_t reason;
   /// The frame, with a matching CRC, in the bytes that were handed in or in the decoder: valid
   /// until either changes. Null for a gap.
@@ -809,7 +830,7 @@ typedef struct axle_ucp_telemetry {
   int16_t acc[3];
   /// Rotation about x, y, z; 16.4 is 1 degree/s.
   int16_t gyro[3];
-  /// Magnetic field in x, y, z.
+  /// Magnetic field in x, y, z: counts of the sensor, whose scale the robot does not tell.
   int16_t mag[3];
   /// Heading, degrees, 0 to 360.
   int16_t heading_deg;
@@ -835,15 +856,15 @@ typedef struct axle_ucp_report {
 
 /// Biases of the inertial sensors (ruling U11).
 typedef struct axle_ucp_imu_bias {
-  /// Acceleration in x, y, z.
+  /// Acceleration in x, y, z; 16,384 is 1 g.
   int16_t acc[3];
-  /// Rotation about x, y, z.
+  /// Rotation about x, y, z; 16.4 is 1 degree/s.
   int16_t gyro[3];
 } axle_ucp_imu_bias;
 
 /// Biases of the magnetometer (ruling U11).
 typedef struct axle_ucp_mag_bias {
-  /// Field in x, y, z.
+  /// Field in x, y, z: counts of the sensor.
   int16_t mag[3];
 } axle_ucp_mag_bias;
 
@@ -1281,7 +1302,7 @@ uint16_t axle_crc16(const uint8_t *data, size_t length);
 int32_t axle_ikeya_position_counts(struct axle_ikeya_position position);
 
 /// The position at so many counts. Both parts have one sign, as in C; fails with
-/// `AXLE_ERROR_POSITION` outside their range.
+/// `AXLE_ERROR_POSITION` beyond 32,767 turns and 8,191 counts, or -32,768 turns and -8,191 counts.
 axle_result axle_ikeya_position_from_counts(int32_t counts, struct axle_ikeya_position *position);
 
 /// Settings for one of the processor's own UARTs: 500 kbit/s, answers within 500 us.
@@ -1748,8 +1769,10 @@ const char *axle_result_name(axle_result result);
 /// What it means, in a few words.
 const char *axle_result_text(axle_result result);
 
-/// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
-/// `sizeof *decoder`. Never call it during another call with the same object.
+/// Makes an empty decoder of this framing: `AXLE_IKEYA_TO_SLAVE`, `AXLE_IKEYA_TO_MASTER`, or, for a
+/// recording of both, `AXLE_IKEYA_BOTH_DIRECTIONS`; the same with `AXLE_IKEYA3_` for boards with
+/// three motors. `size` is `sizeof *decoder`. Never call it during another call with the same
+/// object.
 axle_result axle_ikeya_decoder_init(struct axle_ikeya_decoder *decoder,
                                     size_t size,
                                     uint8_t framing);
@@ -1802,8 +1825,8 @@ axle_result axle_ikeya_decoder_commit(struct axle_ikeya_decoder *decoder, size_t
 /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
 /// B3). Then poll until `AXLE_NONE`.
 ///
-/// A possible start of a frame at the very end is still held: if nothing follows at all,
-/// repeat it until `get_pending` gives 0.
+/// A possible start of a frame at the very end is still held: if nothing follows at all, as
+/// at the end of a file, repeat it, and poll, until `get_pending` gives 0.
 axle_result axle_ikeya_decoder_idle(struct axle_ikeya_decoder *decoder);
 
 /// Number of bytes that are held and undecided.
@@ -1857,8 +1880,8 @@ axle_result axle_ucp_decoder_commit(struct axle_ucp_decoder *decoder, size_t len
 /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
 /// B3). Then poll until `AXLE_NONE`.
 ///
-/// A possible start of a frame at the very end is still held: if nothing follows at all,
-/// repeat it until `get_pending` gives 0.
+/// A possible start of a frame at the very end is still held: if nothing follows at all, as
+/// at the end of a file, repeat it, and poll, until `get_pending` gives 0.
 axle_result axle_ucp_decoder_idle(struct axle_ucp_decoder *decoder);
 
 /// Number of bytes that are held and undecided.
@@ -2000,6 +2023,15 @@ axle_result axle_ucp_host_set_imu_bias(struct axle_ucp_host *host, struct axle_u
 
 /// The same for the magnetometer.
 axle_result axle_ucp_host_set_mag_bias(struct axle_ucp_host *host, struct axle_ucp_mag_bias bias);
+
+/// The biases that the host keeps, for a program that stores them: those of the latest calibration,
+/// which the robot was told are kept, or those that were set; `AXLE_NONE` if there are none.
+axle_result axle_ucp_host_get_imu_bias(const struct axle_ucp_host *host,
+                                       struct axle_ucp_imu_bias *bias);
+
+/// The same of the magnetometer.
+axle_result axle_ucp_host_get_mag_bias(const struct axle_ucp_host *host,
+                                       struct axle_ucp_mag_bias *bias);
 
 /// The counts so far.
 axle_result axle_ucp_host_get_statistics(const struct axle_ucp_host *host,

@@ -345,14 +345,16 @@ template <class C, std::size_t N>
 class Master : public Role<C> {
   public:
     using Role<C>::object;
+    using Velocity = Motors<float, N>;
+    using Place = Motors<axle::Position, N>;
 
     Master(const axle_ikeya_master_config &config, Time now) : Role<C>(&config, now) {}
     Status discover(Time now) { return call(C::discover, object(), now); }
     /// Turns per second.
-    [[nodiscard]] Status set_velocity(std::uint8_t node, Motors<float, N> rps, Time now) {
+    [[nodiscard]] Status set_velocity(std::uint8_t node, Velocity rps, Time now) {
         return call(C::set_velocity, object(), node, rps, now);
     }
-    [[nodiscard]] Status set_position(std::uint8_t node, Motors<Position, N> at, Time now) {
+    [[nodiscard]] Status set_position(std::uint8_t node, Place at, Time now) {
         return call(C::set_position, object(), node, at, now);
     }
     [[nodiscard]] Status stop(std::uint8_t node, Time now) {
@@ -437,6 +439,13 @@ class Host : public Role<HostCalls> {
     std::optional<Time> take_round_trip() {
         const auto us = maybe<std::uint32_t>(axle_ucp_host_take_round_trip, object());
         return us ? std::optional<Time>{Time{*us}} : std::nullopt;
+    }
+    /// What the host keeps, for a program that stores it: of a calibration, or from `set_bias`.
+    std::optional<ImuBias> imu_bias() const {
+        return maybe<ImuBias>(axle_ucp_host_get_imu_bias, object());
+    }
+    std::optional<MagBias> mag_bias() const {
+        return maybe<MagBias>(axle_ucp_host_get_mag_bias, object());
     }
     Status set_bias(ImuBias bias) { return call(axle_ucp_host_set_imu_bias, object(), bias); }
     Status set_bias(MagBias bias) { return call(axle_ucp_host_set_mag_bias, object(), bias); }

@@ -12,7 +12,6 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -20,6 +19,11 @@
 
 namespace axle {
 namespace detail {
+
+/// This long after that, or at the end of time.
+inline Time after(Time begin, Time span) {
+    return span > Time::max() - begin ? Time::max() : begin + span;
+}
 
 inline std::error_code failure(int number) { return {number, std::generic_category()}; }
 
@@ -30,15 +34,18 @@ inline Time steady_now() {
 /// Linux numbers the devices of pseudo-terminals from 136 to 143.
 inline bool is_pseudo_terminal(const char *path) {
     struct stat found {};
-    return ::stat(path, &found) == 0 && major(found.st_rdev) >= 136 && major(found.st_rdev) <= 143;
+    if (::stat(path, &found) != 0) return false;
+    const auto major_number = found.st_rdev >> 8 & 0xFFF;
+    return major_number >= 136 && major_number <= 143;
 }
 
 class SerialPort {
   public:
-    SerialPort(const char *path, std::uint32_t baud) { error_ = open(path, baud); }
-    ~SerialPort() {
-        if (file_ >= 0) ::close(file_);
+    SerialPort(const char *path, std::uint32_t baud) {
+        error_ = open(path, baud);
+        if (error_) close();
     }
+    ~SerialPort() { close(); }
     SerialPort(const SerialPort &) = delete;
     SerialPort &operator=(const SerialPort &) = delete;
 
@@ -55,7 +62,12 @@ class SerialPort {
         return count == 0 ? -1 : count;
     }
 
-    ssize_t write(Bytes bytes) { return ::write(file_, bytes.data(), bytes.size()); }
+    ssize_t write(Bytes bytes) {
+        ssize_t count;
+        do count = ::write(file_, bytes.data(), bytes.size());
+        while (count < 0 && errno == EINTR);
+        return count;
+    }
 
     /// Waits until all bytes have left. A port that keeps them for a second loses them: else an old
     /// command would leave some day.
@@ -71,7 +83,9 @@ class SerialPort {
             ::nanosleep(&nap, nullptr);
         }
         // What is left is in the UART.
-        return ::tcdrain(file_) == 0;
+        while (::tcdrain(file_) != 0)
+            if (errno != EINTR || steady_now() > end) return false;
+        return true;
     }
 
     /// Waits for bytes, at most until `until`.
@@ -86,6 +100,11 @@ class SerialPort {
   private:
     int file_ = -1;
     std::error_code error_;
+
+    void close() {
+        if (file_ >= 0) ::close(file_);
+        file_ = -1;
+    }
 
     std::error_code open(const char *path, std::uint32_t baud) {
         file_ = ::open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
@@ -125,8 +144,11 @@ class Serial {
   public:
     using Event = typename Role::Event;
 
-    /// Why the port could not be opened. Then all else fails.
-    std::error_code error() const { return port_.error(); }
+    /// Why the port could not be opened, or EINVAL for bad settings. Then nothing is sent, and
+    /// `serve` returns it.
+    std::error_code error() const {
+        return port_.error() || role_.made() ? port_.error() : failure(EINVAL);
+    }
     Role &role() { return role_; }
     Time now() const { return steady_now(); }
 
@@ -134,7 +156,8 @@ class Serial {
     /// bytes to leave. Call it often, or `run_for` instead.
     template <class F>
     std::error_code serve(F &&on_event) {
-        std::error_code failed;
+        std::error_code failed = error();
+        if (failed) return failed;
         for (int frame = 0; frame < 8; ++frame) {
             const auto received = receive();
             if (!failed) failed = received;
@@ -152,7 +175,8 @@ class Serial {
         return failed;
     }
 
-    /// Serves the line until `done`, but no longer than to `end`, or until the port fails.
+    /// Serves the line until `done`, but no longer than to `end`, a time of `now`, or until the port
+    /// fails.
     template <class Done, class F>
     std::error_code run_until(Time end, Done &&done, F &&on_event) {
         for (;;) {
@@ -162,10 +186,10 @@ class Serial {
         }
     }
 
-    /// Serves the line for so long, or until the port fails.
+    /// Serves the line for so long, or until the port fails. Without `on_event`, events are dropped.
     template <class F>
     std::error_code run_for(Time span, F &&on_event) {
-        return run_until(now() + span, [] { return false; }, on_event);
+        return run_until(after(now(), span), [] { return false; }, on_event);
     }
     std::error_code run_for(Time span) {
         return run_for(span, [](const Event &) {});
@@ -177,12 +201,11 @@ class Serial {
         : port_{path, config.baud}, role_{config, steady_now()} {}
     ~Serial() = default;
 
-    /// The same as `run_until`, but goes on when the port has failed to take a frame. Drops events.
+    /// The same as `run_until`, but goes on when the port fails. Drops events.
     template <class Done>
     void insist_until(Time end, Done &&done) {
-        while (!done() && now() < end) {
-            const auto failed = run_until(end, done, [](const Event &) {});
-            if (failed && failed != failure(EAGAIN) && failed != failure(ETIMEDOUT)) return;
+        while (!error() && !done() && now() < end) {
+            (void)run_until(end, done, [](const Event &) {});
             port_.wait(std::min(end, now() + std::chrono::milliseconds{1}));
         }
     }
@@ -243,13 +266,18 @@ class Serial {
 
 /// On a pseudo-terminal, as of a simulated bus, bytes take no time.
 inline axle_ikeya_master_config for_port(const char *path, axle_ikeya_master_config config) {
+    if (config.baud == 0) config.baud = 500'000;
     if (is_pseudo_terminal(path)) config.accepts_early = 1;
     return config;
 }
 
 } // namespace detail
 
-/// The master of a motor bus on a serial port. Its end stops what it has told to move.
+/// The master of a motor bus on a serial port. Its end stops each node that it has told to move,
+/// unless it was released since: then it keeps its last command.
+///
+/// A program that is killed, as by Ctrl-C without a handler, stops nothing: catch the signal, or use
+/// slaves with a watchdog.
 template <class M>
 class BasicSerialBus : public detail::Serial<M> {
   public:
@@ -257,7 +285,8 @@ class BasicSerialBus : public detail::Serial<M> {
                             const axle_ikeya_master_config &config = MasterConfig::usb_adapter())
         : detail::Serial<M>(path, detail::for_port(path, config)), coast_{config.coast_us} {}
 
-    /// It waits until the stops are confirmed, not for the motors to come to rest.
+    /// It waits until the stops are confirmed, but no longer than `stop_bound_us`, and not for the
+    /// motors to come to rest: call `stop` to know.
     ~BasicSerialBus() {
         for (std::uint8_t node = 1; node <= 8; ++node) {
             const auto known = master().node(node);
@@ -268,13 +297,14 @@ class BasicSerialBus : public detail::Serial<M> {
                            [&] { return master().bus()->stops_owed == 0; });
     }
 
-    /// Asks all ids; `is_online` then tells which have answered. Drops events.
+    /// Asks all ids; `is_online` then tells which have answered: perhaps none. Fails if that takes
+    /// longer than 30 s. Drops events.
     std::error_code discover() {
         master().discover(this->now());
-        const Time end = this->now() + std::chrono::seconds{10};
-        return this->run_until(
-            end, [&] { return master().bus()->is_discovering == 0; },
-            [](const typename M::Event &) {});
+        const Time end = this->now() + std::chrono::seconds{30};
+        const auto is_over = [&] { return master().bus()->is_discovering == 0; };
+        const auto failed = this->run_until(end, is_over, [](const typename M::Event &) {});
+        return failed || is_over() ? failed : detail::failure(ETIMEDOUT);
     }
 
     bool is_online(std::uint8_t node) {
@@ -282,12 +312,10 @@ class BasicSerialBus : public detail::Serial<M> {
     }
 
     /// Turns per second, from the next `serve` on.
-    template <class Rps>
-    [[nodiscard]] Status set_velocity(std::uint8_t node, Rps rps) {
+    [[nodiscard]] Status set_velocity(std::uint8_t node, typename M::Velocity rps) {
         return master().set_velocity(node, rps, this->now());
     }
-    template <class Place>
-    [[nodiscard]] Status set_position(std::uint8_t node, Place at) {
+    [[nodiscard]] Status set_position(std::uint8_t node, typename M::Place at) {
         return master().set_position(node, at, this->now());
     }
 
@@ -339,7 +367,7 @@ class SerialRover : public detail::Serial<Host> {
         const auto is_still = [&] {
             return role().robot_state()->stop == AXLE_UCP_STOP_STANDING_STILL;
         };
-        insist_until(now() + within, is_still);
+        insist_until(detail::after(now(), within), is_still);
         return is_still();
     }
 };

@@ -76,6 +76,13 @@ static void drive() {
     CHECK(!robot.calibration() && robot.answer_update(AXLE_UCP_OTA_FAILED, now) == AXLE_NONE);
 }
 
+static void keep_biases() {
+    axle::Host host{axle::HostConfig::direct(), 0ms};
+    CHECK(!host.imu_bias() && !host.mag_bias());
+    CHECK(host.set_bias(axle::ImuBias{{1, 2, 3}, {4, 5, 6}}) && host.imu_bias()->gyro[2] == 6);
+    CHECK(host.set_bias(axle::MagBias{{7, 8, 9}}) && host.mag_bias()->mag[0] == 7);
+}
+
 static void decode() {
     axle::Message ping{};
     ping.kind = AXLE_UCP_PING;
@@ -133,6 +140,7 @@ int main() {
     turn<axle::Master, axle::Slave>(1.5f);
     turn<axle::Master3, axle::Slave3>(std::array<float, 3>{1.5f, -2, 0});
     drive();
+    keep_biases();
     decode();
     convert();
     return failures == 0 ? 0 : 1;

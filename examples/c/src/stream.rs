@@ -19,7 +19,8 @@ use crate::{
 pub struct axle_stream_event {
     /// One of `AXLE_STREAM_`.
     pub kind: u8,
-    /// Why the first byte of a gap begins no frame: one of `AXLE_REASON_`; 0 for a frame.
+    /// Why the first byte of a gap begins no frame: one of `AXLE_REASON_`; 0 for a frame. The
+    /// other bytes of the gap may have other reasons: the counters have them all.
     pub reason: u8,
     /// The frame, with a matching CRC, in the bytes that were handed in or in the decoder: valid
     /// until either changes. Null for a gap.
@@ -323,8 +324,10 @@ object! {
     axle_ucp_decoder, AXLE_UCP_DECODER_SIZE = 184, 23 words of UcpDecoder, b"axDu"
 }
 
-/// Makes an empty decoder of this framing, one of `AXLE_IKEYA_` or `AXLE_IKEYA3_`. `size` is
-/// `sizeof *decoder`. Never call it during another call with the same object.
+/// Makes an empty decoder of this framing: `AXLE_IKEYA_TO_SLAVE`, `AXLE_IKEYA_TO_MASTER`, or, for a
+/// recording of both, `AXLE_IKEYA_BOTH_DIRECTIONS`; the same with `AXLE_IKEYA3_` for boards with
+/// three motors. `size` is `sizeof *decoder`. Never call it during another call with the same
+/// object.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ikeya_decoder_init(
     decoder: *mut axle_ikeya_decoder,
@@ -357,6 +360,8 @@ where
 {
     let (out_data, out_length) = (Out::new(data)?, Out::new(length)?);
     let (data, length) = (read(data)?, read(length)?);
+    let size = size_of_val(events);
+    apart(bytes(data, length)?, events.as_ptr().cast(), size)?;
     enter_with(decoder, data, length, |decoder, bytes| {
         let mut rest = bytes;
         let count = decoder.decode_to(&mut rest, events);
@@ -396,8 +401,6 @@ where
 {
     let next = || {
         let count = Out::new(count)?;
-        let size = capacity.saturating_mul(size_of::<axle_stream_event>());
-        apart(bytes(read(data)?, read(length)?)?, events.cast(), size)?;
         let events = slots(events, capacity)?;
         let found = decode(decoder, data, length, events)?;
         count.write(found);
@@ -539,8 +542,8 @@ macro_rules! decoder {
         /// Tells that the line went quiet: the bytes that are held will not be completed (ruling
         /// B3). Then poll until `AXLE_NONE`.
         ///
-        /// A possible start of a frame at the very end is still held: if nothing follows at all,
-        /// repeat it until `get_pending` gives 0.
+        /// A possible start of a frame at the very end is still held: if nothing follows at all, as
+        /// at the end of a file, repeat it, and poll, until `get_pending` gives 0.
         #[unsafe(no_mangle)]
         pub extern "C" fn $idle(decoder: *mut $decoder) -> axle_result {
             of(enter(decoder, |decoder| decoder.idle()))

@@ -388,6 +388,8 @@ fn of_host() -> Functions<axle_ucp_host> {
         axle_ucp_host_take_round_trip(out::<u32>());
         axle_ucp_host_set_imu_bias(axle_ucp_imu_bias::default());
         axle_ucp_host_set_mag_bias(axle_ucp_mag_bias::default());
+        axle_ucp_host_get_imu_bias(out::<axle_ucp_imu_bias>());
+        axle_ucp_host_get_mag_bias(out::<axle_ucp_mag_bias>());
         axle_ucp_host_get_statistics(out::<axle_ucp_host_statistics>());
         axle_ucp_host_get_counters(out::<axle_counters>());
     };
@@ -534,7 +536,8 @@ fn each_function_of_the_header_names_what_is_wrong_and_the_object_still_works() 
         .filter_map(|(before, _)| before.split([' ', '*']).next_back())
         .filter(|name| name.starts_with("axle_"))
         .collect();
-    assert_eq!(declared, seen);
+    let either: Vec<_> = declared.symmetric_difference(&seen).collect();
+    assert!(either.is_empty(), "in the header or tested, but not both: {either:?}");
 }
 
 #[test]
@@ -599,12 +602,16 @@ fn bytes_that_are_too_many_or_in_the_object_are_refused() {
     };
     assert_eq!(many(stream_event(), 0), AXLE_ERROR_VALUE);
     assert_eq!(many(stream_event(), 1), AXLE_ERROR_OVERLAP);
-    assert_eq!(many(stream_event(), usize::MAX), AXLE_ERROR_OVERLAP);
+    let decode = |event: *mut axle_stream_event| {
+        let (mut from, mut length) = (event.cast_const().cast::<u8>(), 1);
+        axle_ucp_decoder_decode(object, &mut from, &mut length, event)
+    };
+    assert_eq!(decode(stream_event()), AXLE_ERROR_OVERLAP);
     let (from, length) = (held(bytes()), held(BYTES.len()));
     for capacity in [isize::MAX as usize, usize::MAX] {
         let events = stream_event().wrapping_add(1 << 20);
         let result = axle_ucp_decoder_decode_many(object, from, length, events, capacity, out());
-        assert!(matches!(result, AXLE_ERROR_TOO_LONG | AXLE_ERROR_OVERLAP), "{result}");
+        assert_eq!(result, AXLE_ERROR_TOO_LONG);
     }
     let too_long = usize::MAX;
     assert_eq!(axle_ikeya_parse(bytes(), too_long, out()), AXLE_ERROR_TOO_LONG);

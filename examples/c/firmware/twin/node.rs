@@ -5,7 +5,7 @@
 
 use core::{
     ffi::c_int,
-    sync::atomic::{AtomicU16, Ordering},
+    sync::atomic::{AtomicBool, AtomicU16, Ordering},
 };
 
 use axlewire::{
@@ -16,7 +16,8 @@ use axlewire::{
 use panic_halt as _;
 
 const STEP: Duration = Duration::from_millis(1);
-const DRIVER_ENABLE: u16 = 8;
+const DRIVER_ENABLE_PORT: usize = 0x4002_0000;
+const DRIVER_ENABLE: u16 = 1 << 8;
 const SIZE: usize = 256;
 
 #[repr(C)]
@@ -29,17 +30,23 @@ unsafe extern "C" {
     fn HAL_Init() -> c_int;
     fn HAL_UARTEx_ReceiveToIdle_DMA(uart: *mut Uart, to: *mut u8, size: u16) -> c_int;
     fn HAL_UART_Transmit(uart: *mut Uart, from: *const u8, size: u16, timeout_ms: u32) -> c_int;
-    fn HAL_GPIO_WritePin(pin: u16, state: c_int);
+    fn HAL_GPIO_WritePin(port: usize, pin: u16, state: c_int);
     fn HAL_Micros() -> u32;
     fn HAL_IsEmulated() -> c_int;
 }
 
 static mut RING: [u8; SIZE] = [0; SIZE];
 static FILLED: AtomicU16 = AtomicU16::new(0);
+static HAS_ENDED: AtomicBool = AtomicBool::new(false);
 
 #[unsafe(no_mangle)]
 pub extern "C" fn HAL_UARTEx_RxEventCallback(_: *mut Uart, size: u16) {
     FILLED.store(size % SIZE as u16, Ordering::Relaxed);
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn HAL_UART_ErrorCallback(_: *mut Uart) {
+    HAS_ENDED.store(true, Ordering::Relaxed);
 }
 
 struct Node {
@@ -69,6 +76,18 @@ impl Node {
         self.slave.handle_input(ring.get(self.taken..end).unwrap_or_default(), now);
         self.taken = end;
         self.slave.handle_timeout(empty_at);
+        if HAS_ENDED.load(Ordering::Relaxed) {
+            self.begin_to_receive();
+        }
+    }
+
+    fn begin_to_receive(&mut self) {
+        HAS_ENDED.store(false, Ordering::Relaxed);
+        FILLED.store(0, Ordering::Relaxed);
+        self.taken = 0;
+        let ring = (&raw mut RING).cast();
+        // SAFETY: the ring stays where it is.
+        unsafe { HAL_UARTEx_ReceiveToIdle_DMA(&raw mut huart1, ring, SIZE as u16) };
     }
 
     fn answer(&mut self) {
@@ -76,7 +95,7 @@ impl Node {
             let now = self.now();
             let Some(frame) = self.slave.poll_transmit(now) else { return };
             // SAFETY: writes a register.
-            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE, 1) };
+            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE_PORT, DRIVER_ENABLE, 1) };
             // SAFETY: the frame stays where it is during the call.
             let sent = unsafe {
                 HAL_UART_Transmit(&raw mut huart1, frame.as_ptr(), frame.len() as u16, 2)
@@ -86,7 +105,7 @@ impl Node {
                 self.slave.handle_transmit(Transmit::Unsent(Unsent::CutOff), now);
             }
             // SAFETY: writes a register.
-            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE, 0) };
+            unsafe { HAL_GPIO_WritePin(DRIVER_ENABLE_PORT, DRIVER_ENABLE, 0) };
         }
     }
 
@@ -97,7 +116,8 @@ impl Node {
         };
         self.rps += (speed - self.rps) / 16.0;
         let is_still = self.rps > -1e-3 && self.rps < 1e-3;
-        self.slave.set_velocity(Rps::new(if is_still { 0.0 } else { self.rps }).unwrap_or_default());
+        self.slave
+            .set_velocity(Rps::new(if is_still { 0.0 } else { self.rps }).unwrap_or_default());
     }
 }
 
@@ -110,13 +130,13 @@ pub extern "C" fn main() -> c_int {
     };
     let mut config = if is_emulated { SlaveConfig::usb_adapter() } else { SlaveConfig::direct() };
     config.watchdog = Some(Duration::from_millis(500));
+    config.two_wire = true;
     let timer = Wrapping32::new();
     // SAFETY: reads a register.
     let begin = timer.at(unsafe { HAL_Micros() });
     let slave = Slave::new(NodeId::N1, Mode::Velocity, config, begin);
     let mut node = Node { slave, timer, taken: 0, rps: 0.0 };
-    // SAFETY: the ring stays where it is.
-    unsafe { HAL_UARTEx_ReceiveToIdle_DMA(&raw mut huart1, (&raw mut RING).cast(), SIZE as u16) };
+    node.begin_to_receive();
     let mut step_at = node.now();
     loop {
         node.receive();

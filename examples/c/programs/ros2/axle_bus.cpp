@@ -39,20 +39,25 @@ class AxleBus : public hw::SystemInterface {
     }
     hw::CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
         auto config = axle::MasterConfig::usb_adapter();
-        config.dead_man_us = 500'000; // no write, no motion
+        config.dead_man_us = 500'000; // reads without a write stop the joints
         bus_.emplace(info_.hardware_parameters.at("port").c_str(), config);
-        if (bus_->discover()) return hw::CallbackReturn::ERROR;
+        if (bus_->discover()) return hw::CallbackReturn::ERROR; // also if the port is in use
         for (const auto &joint : joints_)
             if (!bus_->is_online(joint.node)) return hw::CallbackReturn::ERROR;
         return hw::CallbackReturn::SUCCESS;
     }
     hw::CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) override {
         bool is_still = true;
-        for (auto &joint : joints_) is_still = bus_->stop(joint.node) && is_still;
+        for (auto &joint : joints_) is_still = (!bus_ || bus_->stop(joint.node)) && is_still;
         bus_.reset();
         return is_still ? hw::CallbackReturn::SUCCESS : hw::CallbackReturn::ERROR;
     }
+    // After an ERROR of `read` or `write` nobody serves the bus any more.
+    hw::CallbackReturn on_error(const rclcpp_lifecycle::State &state) override {
+        return on_deactivate(state);
+    }
     hw::return_type read(const rclcpp::Time &, const rclcpp::Duration &period) override {
+        if (!bus_) return hw::return_type::OK; // not activated
         // The line has half of each cycle; the controllers have the rest.
         if (bus_->run_for(axle::Time{period.nanoseconds() / 2000})) return hw::return_type::ERROR;
         for (auto &joint : joints_) {
@@ -63,7 +68,7 @@ class AxleBus : public hw::SystemInterface {
     }
     hw::return_type write(const rclcpp::Time &, const rclcpp::Duration &) override {
         for (const auto &joint : joints_) {
-            if (std::isnan(joint.commanded)) continue; // no controller yet
+            if (!bus_ || std::isnan(joint.commanded)) continue; // no controller yet
             const auto rps = static_cast<float>(joint.commanded / turn);
             if (!bus_->set_velocity(joint.node, rps)) return hw::return_type::ERROR;
         }

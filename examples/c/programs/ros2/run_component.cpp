@@ -18,6 +18,8 @@ int main(int argc, char **argv) {
     if (component->on_init(info) != CallbackReturn::SUCCESS) return 1;
     const double &measured = *component->export_state_interfaces().at(0).value;
     double &commanded = *component->export_command_interfaces().at(0).value;
+    // It is read before it is activated, too.
+    if (component->read({}, rclcpp::Duration{10'000'000}) != return_type::OK) return 1;
     if (component->on_activate({}) != CallbackReturn::SUCCESS) return std::puts("no joint"), 1;
 
     const rclcpp::Duration period{10'000'000};
@@ -30,8 +32,10 @@ int main(int argc, char **argv) {
         if (cycle % 40 == 39) std::printf("%.2f rad/s\n", measured);
         std::this_thread::sleep_until(next += std::chrono::milliseconds{10});
     }
+    // A manager calls only one of both.
+    const auto ended = is_fine ? component->on_deactivate({}) : component->on_error({});
+    const bool is_still = ended == CallbackReturn::SUCCESS;
     is_fine = is_fine && std::fabs(measured - commanded) < 0.1;
-    const bool is_still = component->on_deactivate({}) == CallbackReturn::SUCCESS;
     std::puts(is_still ? "standing still" : "the joint may be moving");
     return is_fine && is_still ? 0 : 1;
 }

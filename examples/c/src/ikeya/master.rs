@@ -34,24 +34,27 @@ pub struct axle_ikeya_master_config {
     pub reply_timeout_us: u32,
     /// Time after a missed answer during which the node is not polled again.
     pub late_guard_us: u32,
-    /// Silence between a request or an answer and the next request, for transceivers that need it.
+    /// Silence between a request or an answer and the next request, for transceivers that need it;
+    /// 0 by default.
     pub turnaround_gap_us: u32,
-    /// Period in which each node is read, for `AXLE_IKEYA_POLLING_EVERY`.
+    /// Period in which each node is read, for `AXLE_IKEYA_POLLING_EVERY`; with 0, as fast as the
+    /// line allows.
     pub polling_period_us: u32,
-    /// Age of a measured position that a stop may hold; 0: always read (ruling I6).
+    /// Age of a measured position that a stop may hold; 0, the default: always read (ruling I6).
     pub hold_age_us: u32,
     /// Time in which a motor may come to rest after its stop is confirmed (ruling I12); 2 s.
     pub coast_us: u32,
     /// Time without a command or `keep_alive` after which every node under a set-point is owed a
-    /// stop (ruling I13); 0 switches it off.
+    /// stop (ruling I13); 0, the default, for none.
     pub dead_man_us: u32,
     /// Ids on this bus; all eight by default.
     pub nodes: axle_ikeya_node_set,
-    /// One of `AXLE_IKEYA_POLLING_`.
+    /// One of `AXLE_IKEYA_POLLING_`; `AXLE_IKEYA_POLLING_FASTEST` by default.
     pub polling: u8,
-    /// Attempts of a READ before it has failed (ruling I8); 0 counts as 1.
+    /// Attempts of a READ before it has failed (ruling I8); 3 by default, 0 counts as 1.
     pub attempts: u8,
-    /// Share of line time for finding abnormal nodes, percent; more than 50 counts as 50 (I13).
+    /// Share of line time for finding abnormal nodes, percent; 5 by default, more than 50 counts
+    /// as 50 (I13).
     pub recovery_share_pct: u8,
     /// Not 0 if an answer may arrive before the line could have carried it, as behind a pipe, or
     /// if the clock is coarser than 20 us.
@@ -176,7 +179,8 @@ pub const AXLE_IKEYA_MASTER_STOPPED: u8 = 10;
 pub const AXLE_IKEYA_MASTER_STANDING_STILL: u8 = 11;
 /// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
 pub const AXLE_IKEYA_MASTER_STILL_MOVING: u8 = 12;
-/// The same for a node that is owed a stop, which is not written: `node` (rulings I11, I12).
+/// The mode of a node that is owed a stop is still in doubt, so the stop is not written: `node`
+/// (rulings I11, I12).
 pub const AXLE_IKEYA_MASTER_STOP_BLOCKED: u8 = 13;
 /// The dead-man has fired (ruling I13).
 pub const AXLE_IKEYA_MASTER_DEAD_MAN: u8 = 14;

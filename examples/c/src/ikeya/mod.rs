@@ -26,7 +26,8 @@ pub const AXLE_IKEYA_MODE_VELOCITY: axle_ikeya_mode = 1;
 /// The position of its motors.
 pub const AXLE_IKEYA_MODE_POSITION: axle_ikeya_mode = 2;
 
-/// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts.
+/// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts. Any
+/// values are a position, the sum of both parts: 2 turns and 8192 counts are 3 turns.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct axle_ikeya_position {
@@ -49,7 +50,7 @@ pub extern "C" fn axle_ikeya_position_counts(position: axle_ikeya_position) -> i
 }
 
 /// The position at so many counts. Both parts have one sign, as in C; fails with
-/// `AXLE_ERROR_POSITION` outside their range.
+/// `AXLE_ERROR_POSITION` beyond 32,767 turns and 8,191 counts, or -32,768 turns and -8,191 counts.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ikeya_position_from_counts(
     counts: i32,

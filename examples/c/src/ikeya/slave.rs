@@ -34,7 +34,8 @@ pub struct axle_ikeya_slave_config {
     pub idle_us: u32,
     /// Time during which an answer may still be sent (ruling I14).
     pub answer_within_us: u32,
-    /// Not 0 if the slaves on this line hear each other, as on two wires (ruling I14).
+    /// Not 0 if the slaves on this line hear each other's answers, as on RS485 with one pair of
+    /// wires; 0, the default, on two pairs (ruling I14).
     pub two_wire: u8,
 }
 plain!(axle_ikeya_slave_config);

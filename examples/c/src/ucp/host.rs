@@ -651,6 +651,25 @@ pub extern "C" fn axle_ucp_host_set_mag_bias(
     of(enter(host, |host| host.store_mut().mag = Some(bias.into())))
 }
 
+/// The biases that the host keeps, for a program that stores them: those of the latest calibration,
+/// which the robot was told are kept, or those that were set; `AXLE_NONE` if there are none.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_host_get_imu_bias(
+    host: *const axle_ucp_host,
+    bias: *mut axle_ucp_imu_bias,
+) -> axle_result {
+    get(host, bias, |host| host.store_mut().imu.map(Into::into))
+}
+
+/// The same of the magnetometer.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_host_get_mag_bias(
+    host: *const axle_ucp_host,
+    bias: *mut axle_ucp_mag_bias,
+) -> axle_result {
+    get(host, bias, |host| host.store_mut().mag.map(Into::into))
+}
+
 /// The counts so far.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_get_statistics(

@@ -40,7 +40,7 @@ pub struct axle_ucp_telemetry {
     pub acc: [i16; 3],
     /// Rotation about x, y, z; 16.4 is 1 degree/s.
     pub gyro: [i16; 3],
-    /// Magnetic field in x, y, z.
+    /// Magnetic field in x, y, z: counts of the sensor, whose scale the robot does not tell.
     pub mag: [i16; 3],
     /// Heading, degrees, 0 to 360.
     pub heading_deg: i16,
@@ -73,9 +73,9 @@ impl From<axle_ucp_telemetry> for Telemetry {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct axle_ucp_imu_bias {
-    /// Acceleration in x, y, z.
+    /// Acceleration in x, y, z; 16,384 is 1 g.
     pub acc: [i16; 3],
-    /// Rotation about x, y, z.
+    /// Rotation about x, y, z; 16.4 is 1 degree/s.
     pub gyro: [i16; 3],
 }
 plain!(axle_ucp_imu_bias);
@@ -96,7 +96,7 @@ impl From<axle_ucp_imu_bias> for ImuBias {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct axle_ucp_mag_bias {
-    /// Field in x, y, z.
+    /// Field in x, y, z: counts of the sensor.
     pub mag: [i16; 3],
 }
 plain!(axle_ucp_mag_bias);

@@ -55,6 +55,9 @@ class SystemInterface {
     virtual std::vector<CommandInterface> export_command_interfaces() = 0;
     virtual CallbackReturn on_activate(const rclcpp_lifecycle::State &) = 0;
     virtual CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) = 0;
+    virtual CallbackReturn on_error(const rclcpp_lifecycle::State &) {
+        return CallbackReturn::ERROR;
+    }
     virtual return_type read(const rclcpp::Time &time, const rclcpp::Duration &period) = 0;
     virtual return_type write(const rclcpp::Time &time, const rclcpp::Duration &period) = 0;
 
