@@ -132,7 +132,9 @@ class SerialPort {
         case 500'000: return B500000;
         case 921'600: return B921600;
         case 1'000'000: return B1000000;
+        case 1'500'000: return B1500000;
         case 2'000'000: return B2000000;
+        case 3'000'000: return B3000000;
         default: return B0;
         }
     }
