@@ -13,10 +13,14 @@ use arbitrary::{Arbitrary, Unstructured};
 use axlewire::{
     crc16,
     endpoint::{Arrival, Endpoint, Transmit, Unsent},
-    ikeya::{Master, Mode, NodeId, Rps, Slave, master::MasterConfig, slave::SlaveConfig},
+    ikeya::{
+        self, BothDirections, Master, Mode, NodeId, Packet, Rps, Slave, master::MasterConfig,
+        slave::SlaveConfig,
+    },
+    stream::Event,
     time::Instant,
     ucp::{
-        Host, MotorControl, Robot, Telemetry,
+        self, Host, MotorControl, Robot, Telemetry,
         host::{HostConfig, MemoryStore},
         robot::RobotConfig,
     },
@@ -151,6 +155,94 @@ macro_rules! role {
     }};
 }
 
+/// The bytes of a frame.
+trait Bytes {
+    fn bytes(&self) -> &[u8];
+}
+
+impl Bytes for Packet<'_> {
+    fn bytes(&self) -> &[u8] {
+        self.as_bytes()
+    }
+}
+
+impl Bytes for &ucp::Frame {
+    fn bytes(&self) -> &[u8] {
+        self.as_bytes()
+    }
+}
+
+/// An event of C is that of Rust.
+fn told<F: Bytes>(c: &axle_stream_event, rust: Option<Event<F>>) {
+    match rust {
+        Some(Event::Frame(frame)) => {
+            let frame = frame.bytes();
+            assert_eq!((c.kind, c.length), (AXLE_STREAM_FRAME, frame.len()));
+            let crc = |length| (axle_crc16(c.bytes, length), crc16::compute(&frame[..length]));
+            for length in [frame.len() - 2, frame.len()] {
+                let (c, rust) = crc(length);
+                assert_eq!(c, rust);
+            }
+        }
+        Some(Event::Skipped(gap)) => {
+            assert_eq!((c.kind, c.skipped), (AXLE_STREAM_SKIPPED, gap.len));
+        }
+        None => panic!("nothing"),
+    }
+}
+
+const NO_EVENT: axle_stream_event =
+    axle_stream_event { kind: 0, reason: 0, bytes: null(), length: 0, skipped: 0 };
+
+/// A call of the decoder of C and of that of Rust.
+macro_rules! decoder {
+    ($step:expr, $c:expr, $rust:expr, $decode:ident $many:ident $push:ident $poll:ident $idle:ident) => {{
+        let (c, rust, null_pointer) = ($c, $rust, $step.null);
+        let object = if null_pointer { null_mut() } else { c };
+        let mut event = NO_EVENT;
+        match &$step.call {
+            Call::Input(bytes) => {
+                let (mut data, mut length, mut rest) = (bytes.as_ptr(), bytes.len(), *bytes);
+                loop {
+                    let result = $decode(object, &mut data, &mut length, &mut event);
+                    if result != AXLE_OK {
+                        let expected = if null_pointer { AXLE_ERROR_NULL } else { AXLE_NONE };
+                        assert_eq!(result, expected);
+                        break;
+                    }
+                    told(&event, rust.decode(&mut rest));
+                }
+                assert!(null_pointer || length == 0 && rust.decode(&mut rest).is_none());
+            }
+            Call::OldInput(bytes, capacity) => {
+                let (mut data, mut length, mut rest) = (bytes.as_ptr(), bytes.len(), *bytes);
+                let (mut events, mut count) = ([NO_EVENT; 8], 0);
+                let (at, most) = (events.as_mut_ptr(), usize::from(capacity % 8) + 1);
+                while $many(object, &mut data, &mut length, at, most, &mut count) == AXLE_OK {
+                    assert!((1..=most).contains(&count));
+                    for event in &events[..count] {
+                        told(event, rust.decode(&mut rest));
+                    }
+                }
+                assert!(null_pointer || length == 0 && rust.decode(&mut rest).is_none());
+            }
+            Call::Sent(byte) if !null_pointer => {
+                let result = $push(c, *byte);
+                assert_eq!(result != AXLE_NONE, rust.push(*byte));
+            }
+            Call::Timeout if !null_pointer => {
+                assert_eq!($idle(c), AXLE_OK);
+                rust.idle();
+            }
+            _ if null_pointer => assert_eq!($poll(c, null_mut()), AXLE_ERROR_NULL),
+            _ => match $poll(c, &mut event) {
+                AXLE_OK => told(&event, rust.poll()),
+                _ => assert!(rust.poll().is_none()),
+            },
+        }
+    }};
+}
+
 fn run(data: &[u8]) -> arbitrary::Result<()> {
     let mut input = Unstructured::new(data);
     let (mut now, start) = (0_u64, Instant::from_micros(0));
@@ -185,12 +277,23 @@ fn run(data: &[u8]) -> arbitrary::Result<()> {
     assert_eq!(axle_ucp_robot_init(robot, AXLE_UCP_ROBOT_SIZE, config.as_ptr(), now), AXLE_OK);
     let mut rust_robot = Robot::new(RobotConfig::direct(), start);
 
+    let mut memory = MaybeUninit::<axle_ikeya_decoder>::uninit();
+    let bus = memory.as_mut_ptr();
+    let framing = AXLE_IKEYA_BOTH_DIRECTIONS;
+    assert_eq!(axle_ikeya_decoder_init(bus, AXLE_IKEYA_DECODER_SIZE, framing), AXLE_OK);
+    let mut rust_bus = ikeya::Decoder::<BothDirections>::new();
+
+    let mut memory = MaybeUninit::<axle_ucp_decoder>::uninit();
+    let rover = memory.as_mut_ptr();
+    assert_eq!(axle_ucp_decoder_init(rover, AXLE_UCP_DECODER_SIZE), AXLE_OK);
+    let mut rust_rover = ucp::Decoder::new();
+
     while !input.is_empty() {
         let step = Step::arbitrary(&mut input)?;
         now += u64::from(step.later_us);
         let at = Instant::from_micros(now);
         if let (Call::Command(which, a, b), false) = (&step.call, step.null) {
-            match step.role % 4 {
+            match step.role % 6 {
                 0 => of_master(master, &mut rust_master, *which, *a, now),
                 1 => {
                     let rps = f32::from(*a) / 100.0;
@@ -198,6 +301,7 @@ fn run(data: &[u8]) -> arbitrary::Result<()> {
                     rust_slave.set_velocity(Rps::new(rps).unwrap_or(Rps::ZERO));
                 }
                 2 => of_host(host, &mut rust_host, *which, (*a, *b), now),
+                4 | 5 => {}
                 _ => {
                     let telemetry = axle_ucp_telemetry { heading_deg: *a, ..Default::default() };
                     let result = axle_ucp_robot_set_telemetry(robot, &telemetry, now);
@@ -211,7 +315,13 @@ fn run(data: &[u8]) -> arbitrary::Result<()> {
             }
             continue;
         }
-        match step.role % 4 {
+        match step.role % 6 {
+            4 => decoder!(step, bus, &mut rust_bus,
+                axle_ikeya_decoder_decode axle_ikeya_decoder_decode_many axle_ikeya_decoder_push
+                axle_ikeya_decoder_poll axle_ikeya_decoder_idle),
+            5 => decoder!(step, rover, &mut rust_rover,
+                axle_ucp_decoder_decode axle_ucp_decoder_decode_many axle_ucp_decoder_push
+                axle_ucp_decoder_poll axle_ucp_decoder_idle),
             0 => role!(step, now, master, rust_master, axle_ikeya_master_handle_input
                 axle_ikeya_master_handle_old_input axle_ikeya_master_handle_timeout
                 axle_ikeya_master_poll_transmit axle_ikeya_master_handle_transmit

@@ -315,23 +315,31 @@ fn a_robot_that_may_have_restarted_stands_still_only_once_it_has_had_the_time_to
 }
 
 #[test]
-fn nothing_is_known_of_a_robot_whose_link_was_lost() {
+fn nothing_is_known_of_a_robot_whose_link_was_lost_until_it_is_seen_to_move() {
     let mut config = quiet_config();
     config.rpm_average = Duration::ZERO;
     let mut host = Host::new(config, ms(0));
     host.stop(ms(0));
-    let mut progress = |at: u64, is_heard: bool| {
+    let mut progress = |at: u64, rpm: Option<i16>| {
         host.handle_timeout(ms(at));
         sent(&mut host, ms(at));
-        if is_heard {
-            let report = FirmwareReport::new(&Telemetry::default(), 38).frame((at / 20) as u8);
+        if let Some(rpm) = rpm {
+            let telemetry = Telemetry { rpm: [rpm; 4], ..Telemetry::default() };
+            let report = FirmwareReport::new(&telemetry, 38).frame((at / 20) as u8);
             host.handle_input(report.as_bytes(), ms(at));
         }
         host.stop_progress()
     };
-    let before = (0..300).step_by(20).map(|at| progress(at, true)).last();
-    assert_eq!(before, Some(StandingStill));
-    assert_eq!((300..1000).step_by(20).map(|at| progress(at, false)).last(), Some(NoReports));
-    let back = (1000..9000).step_by(20).find(|&at| progress(at, true) == StandingStill);
-    assert_eq!(back, Some(1000 + u64::from(COAST.as_millis())));
+    let mut last = |times: std::ops::Range<u64>, rpm| {
+        times.step_by(20).map(|at| progress(at, rpm)).last().unwrap()
+    };
+    assert_eq!(last(0..300, Some(0)), StandingStill);
+    assert_eq!(last(300..1000, None), NoReports);
+    let back = 1000 + u64::from(COAST.as_millis());
+    assert_eq!(last(1000..back, Some(0)), StillMoving { rpm: [0; 4] });
+    assert_eq!(last(back..back + 20, Some(0)), StandingStill);
+    assert_eq!(last(back + 20..back + 1000, None), NoReports);
+    // What reports a motion has not restarted since.
+    assert_eq!(last(back + 1000..back + 1020, Some(6)), StillMoving { rpm: [6; 4] });
+    assert_eq!(last(back + 1020..back + 1080, Some(0)), StandingStill);
 }

@@ -100,7 +100,7 @@ pub(super) fn may_be_a_restart(pause: Duration, steps: Option<u8>) -> bool {
 }
 
 /// Whether all wheels stand still: turning on the spot is also motion.
-fn are_still(rpm: &[i16; 4]) -> bool {
+pub(super) fn are_still(rpm: &[i16; 4]) -> bool {
     rpm.iter().all(|wheel| wheel.unsigned_abs() <= STILL_RPM)
 }
 

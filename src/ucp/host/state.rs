@@ -12,7 +12,7 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
-    standstill::{COAST, StopProgress, Wheels, may_be_a_restart},
+    standstill::{COAST, StopProgress, Wheels, are_still, may_be_a_restart},
     statistics::HostStatistics,
     update::Update,
 };
@@ -290,7 +290,9 @@ impl<S: BiasStore> State<S> {
         let report = ReceivedReport::new(report, index, lost);
         let at = self.arrived_since.map_or(at, |since| at.min(since));
         // A vendor robot that has restarted reports 0 until its next move, whatever its wheels do.
-        if self.stats.reports > 1 && may_be_a_restart(at - self.reported_at, steps) {
+        if !are_still(&report.telemetry.rpm) {
+            self.coasts_until = at;
+        } else if self.stats.reports > 1 && may_be_a_restart(at - self.reported_at, steps) {
             self.coasts_until = at + COAST;
         }
         self.reported_at = at;
