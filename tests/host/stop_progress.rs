@@ -298,9 +298,12 @@ fn seen_after_a_pause(pause_ms: u64, index: u8) -> u64 {
 fn a_robot_that_may_have_restarted_stands_still_only_once_it_has_had_the_time_to_coast() {
     for (pause_ms, index, has_restarted) in [
         (0, 6, false),
-        (60, 0, false),
+        (0, 12, false),
         (400, 26, false),
         (400, 6, false),
+        // In bursts, without a pause, and behind one.
+        (0, 13, true),
+        (0, 0, true),
         (400, 0, true),
         (400, 60, true),
         (800, 46, false),

@@ -7,7 +7,7 @@ use axlewire::{
     time::{Duration, Instant},
     ucp::{
         Host, MotorControl,
-        host::{HostConfig, HostEvent, HostStatistics, Link, STILL_REPORTS, StopProgress},
+        host::{COAST, HostConfig, HostEvent, HostStatistics, Link, STILL_REPORTS, StopProgress},
     },
 };
 
@@ -173,7 +173,7 @@ impl Rover {
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, before) = (self.now(), self.host().statistics().commands);
         let give_up = self.session.awake() + STOP_PATIENCE;
-        let mut end = give_up;
+        let (mut end, mut is_in_doubt) = (give_up, false);
         // When the stop was flushed; the number of reports before the robot had heard of it, and
         // when it had.
         let (mut told, mut unheard) = (None, None);
@@ -199,6 +199,12 @@ impl Rover {
                 return Ok(());
             }
             let awake = self.session.awake();
+            let shows_none = matches!(progress, StopProgress::StillMoving { rpm: [0, 0, 0, 0] });
+            if awake >= end && shows_none && !is_in_doubt {
+                // It may have restarted: its reports then say nothing for a while.
+                is_in_doubt = true;
+                end = awake + Span::from(COAST);
+            }
             if awake >= end || result.is_err() && awake >= give_up {
                 break result.err();
             }

@@ -349,6 +349,9 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let heard = heard.get();
     stopped.judge_each(args, &bus, heard.nodes);
     (stopped.others, stopped.hint) = (heard.others, heard.hint(B::PROTOCOL));
+    if heard.others && stopped.answered > 0 && stopped.complaints.is_empty() {
+        stopped.complaints.push("the motors of other boards may be moving".to_owned());
+    }
     if let Some(patience) = needs.filter(|_| stopped.complaints.is_empty()) {
         eprintln!("axle: answers come late: others need --reply-timeout {patience} on this line");
     }

@@ -12,11 +12,11 @@ pub const COAST: Duration = Duration::from_secs(3);
 /// are just reversing.
 pub const STILL_REPORTS: u8 = 3;
 
-/// Pause between two reports in which a robot may have restarted.
-const SHORTEST_RESTART: Duration = Duration::from_millis(100);
-
 /// Shortest time between two reports of a robot: vendor robots report every 20 ms.
 const SHORTEST_PERIOD: Duration = Duration::from_millis(16);
+
+/// How much later than another a report may arrive, without the line having been lost.
+const JITTER: Duration = Duration::from_millis(100);
 
 /// Fastest turn of a wheel that stands still, rpm.
 const STILL_RPM: u16 = 2;
@@ -40,9 +40,9 @@ pub enum StopProgress {
         rpm: [i16; 4],
     },
     /// The latest three reports, all received since, show every wheel at 2 rpm or less, and the
-    /// last of them is an average of the time since. If the robot may have restarted since (its
-    /// reports paused for 100 ms, and their index does not go on), it is one of [`COAST`] later: a
-    /// vendor robot then reports 0 until its next move.
+    /// last of them is an average of the time since. If the robot may have restarted since (the
+    /// index of its reports does not go on, or they paused for the link timeout), it is one of
+    /// [`COAST`] later: a vendor robot then reports 0 until its next move.
     StandingStill,
 }
 
@@ -93,10 +93,10 @@ pub(super) struct Wheels {
 }
 
 /// Whether a robot may have restarted in this pause between two reports: the index goes back, or on
-/// by more than the pause holds, or nothing is known of it.
-pub(super) fn may_be_a_restart(pause: Duration, steps: Option<u8>) -> bool {
-    let is_more = |steps: u8| SHORTEST_PERIOD.saturating_mul(steps.into()) > pause;
-    pause >= SHORTEST_RESTART && steps.is_none_or(is_more)
+/// by more than the pause holds. A restart within a second is not seen if the index happens to go
+/// on as if nothing had been, in one of five to one of ten.
+pub(super) fn may_be_a_restart(pause: Duration, steps: u8) -> bool {
+    SHORTEST_PERIOD.saturating_mul(steps.into()) > pause + JITTER
 }
 
 /// Whether all wheels stand still: turning on the spot is also motion.

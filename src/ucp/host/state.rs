@@ -57,8 +57,9 @@ pub(super) struct State<S> {
     pub(super) is_report_new: bool,
     /// Round trip of the latest pong, until it is taken.
     pub(super) new_round_trip: Option<Duration>,
-    /// When the latest report arrived, if there is one.
+    /// When the latest report arrived, if there is one, and its index.
     reported_at: Instant,
+    reported_index: u8,
     /// Until when the wheels of a robot that may have restarted may coast.
     coasts_until: Instant,
     /// Index of the previous report, if there is one to count from.
@@ -103,6 +104,7 @@ impl<S: BiasStore> State<S> {
             is_report_new: false,
             new_round_trip: None,
             reported_at: now,
+            reported_index: 0,
             coasts_until: now,
             last_index: None,
             imu: Results::new(),
@@ -280,22 +282,28 @@ impl<S: BiasStore> State<S> {
 
     fn report(&mut self, report: &Report<'_>, frame: &Frame, at: Instant) {
         let index = frame.index();
-        let steps = self.last_index.replace(index).map(|last| index.wrapping_sub(last));
-        if steps == Some(0) {
-            count(&mut self.stats.reports_repeated);
-        }
-        let lost = steps.map_or(0, |steps| steps.saturating_sub(1));
+        let lost = match self.last_index.replace(index) {
+            Some(last) if last == index => {
+                count(&mut self.stats.reports_repeated);
+                0
+            }
+            Some(last) => index.wrapping_sub(last).wrapping_sub(1),
+            None => 0,
+        };
         count(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
-        let at = self.arrived_since.map_or(at, |since| at.min(since));
+        let since = self.arrived_since.map_or(at, |since| at.min(since));
         // A vendor robot that has restarted reports 0 until its next move, whatever its wheels do.
+        let (pause, steps) = (since - self.reported_at, index.wrapping_sub(self.reported_index));
+        let is_in_doubt = pause >= self.config.link_timeout || may_be_a_restart(pause, steps);
         if !are_still(&report.telemetry.rpm) {
             self.coasts_until = at;
-        } else if self.stats.reports > 1 && may_be_a_restart(at - self.reported_at, steps) {
+        } else if self.stats.reports > 1 && is_in_doubt {
             self.coasts_until = at + COAST;
         }
-        self.reported_at = at;
+        (self.reported_at, self.reported_index) = (at, index);
+        let at = since;
         self.motor.standstill().report(&Wheels {
             rpm: report.telemetry.rpm,
             at,

@@ -42,7 +42,6 @@ pub(super) struct Before {
     faults: usize,
     is_whole: bool,
     is_lost: bool,
-    links_lost: u32,
 }
 
 /// The speed commanded by a frame.
@@ -60,7 +59,6 @@ impl<P: Wired> HostLife<P> {
             faults: line.faults(),
             is_whole: line.wire.open.is_empty() && self.driver.unsent().is_empty(),
             is_lost: self.driver.role().link() == Link::Down,
-            links_lost: self.driver.role().statistics().links_lost,
         }
     }
 
