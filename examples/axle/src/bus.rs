@@ -181,10 +181,11 @@ impl<B: Boards> Bus<B> {
         config.reply_timeout < SLOW_TIMEOUT && config.nodes.iter().any(is_late)
     }
 
-    /// The same, once each id has been asked.
+    /// The same, once each id has been asked, and two answers were late: one alone may be a hiccup.
     fn must_wait_longer(&self) -> bool {
-        let mut nodes = self.master().config().nodes.iter();
-        self.could_wait_longer() && !nodes.any(|node| self.is_unasked(node, 1))
+        let nodes = || self.master().config().nodes.iter();
+        let late: u32 = nodes().map(|node| self.late(node)).sum();
+        self.could_wait_longer() && late > 1 && !nodes().any(|node| self.is_unasked(node, 1))
     }
 
     /// Ids that have answered, in time or not.

@@ -79,8 +79,7 @@ class SerialPort {
                 ::tcflush(file_, TCOFLUSH);
                 return false;
             }
-            const timespec nap{0, 200'000};
-            ::nanosleep(&nap, nullptr);
+            nap();
         }
         // What is left is in the UART.
         while (::tcdrain(file_) != 0)
@@ -95,11 +94,17 @@ class SerialPort {
                             static_cast<long>(left % 1'000'000 * 1000)};
         pollfd readable{file_, POLLIN, 0};
         ::ppoll(&readable, 1, &span, nullptr);
+        if (readable.revents & ~POLLIN) nap(); // it has failed, and would not wait
     }
 
   private:
     int file_ = -1;
     std::error_code error_;
+
+    static void nap() {
+        const timespec span{0, 200'000};
+        ::nanosleep(&span, nullptr);
+    }
 
     void close() {
         if (file_ >= 0) ::close(file_);
@@ -113,6 +118,7 @@ class SerialPort {
         // Two programs on one line would read each other's answers.
         if (::flock(file_, LOCK_EX | LOCK_NB) != 0) return failure(EBUSY);
         ::cfmakeraw(&line);
+        line.c_iflag &= ~static_cast<tcflag_t>(IXOFF | IXANY | INPCK);
         line.c_cflag &= ~static_cast<tcflag_t>(CSTOPB | CRTSCTS);
         line.c_cflag |= CLOCAL | CREAD;
         if (speed_of(baud) == B0) return failure(EINVAL);
