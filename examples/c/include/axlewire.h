@@ -1612,6 +1612,9 @@ axle_result axle_ikeya_slave_get_command(const struct axle_ikeya_slave *slave,
                                          uint64_t now_us,
                                          struct axle_ikeya_motion *command);
 
+/// The mode, one of `AXLE_IKEYA_MODE_`.
+axle_result axle_ikeya_slave_get_mode(const struct axle_ikeya_slave *slave, axle_ikeya_mode *mode);
+
 /// Changes the mode; the command in force ends.
 axle_result axle_ikeya_slave_set_mode(struct axle_ikeya_slave *slave, axle_ikeya_mode mode);
 
@@ -1689,6 +1692,10 @@ axle_result axle_ikeya3_slave_poll_event(struct axle_ikeya3_slave *slave,
 axle_result axle_ikeya3_slave_get_command(const struct axle_ikeya3_slave *slave,
                                           uint64_t now_us,
                                           struct axle_ikeya_motion *command);
+
+/// The mode, one of `AXLE_IKEYA_MODE_`.
+axle_result axle_ikeya3_slave_get_mode(const struct axle_ikeya3_slave *slave,
+                                       axle_ikeya_mode *mode);
 
 /// Changes the mode; the command in force ends.
 axle_result axle_ikeya3_slave_set_mode(struct axle_ikeya3_slave *slave, axle_ikeya_mode mode);
@@ -2014,6 +2021,10 @@ axle_result axle_ucp_host_get_robot_state(const struct axle_ucp_host *host,
 
 /// The latest report, once; `AXLE_NONE` if there is no new one. It need not be polled as an event.
 axle_result axle_ucp_host_take_report(struct axle_ucp_host *host, struct axle_ucp_report *report);
+
+/// The latest report, however old; `AXLE_NONE` if there is none.
+axle_result axle_ucp_host_get_report(const struct axle_ucp_host *host,
+                                     struct axle_ucp_report *report);
 
 /// Time of the latest ping to its pong, once, microseconds; `AXLE_NONE` if there is no new one.
 axle_result axle_ucp_host_take_round_trip(struct axle_ucp_host *host, uint32_t *round_trip_us);

@@ -225,7 +225,7 @@ namespace detail {
     AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
 #define AXLE_SLAVE(c)                                                                              \
     AXLE_ROLE(c, axle_ikeya_slave)                                                                 \
-    AXLE_CALL(c, get_command) AXLE_CALL(c, set_mode)                                                   \
+    AXLE_CALL(c, get_command) AXLE_CALL(c, get_mode) AXLE_CALL(c, set_mode)                        \
     AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
 struct IkeyaDecoderCalls { AXLE_DECODER(axle_ikeya_decoder) };
 struct UcpDecoderCalls { AXLE_DECODER(axle_ucp_decoder) };
@@ -387,6 +387,7 @@ class Slave : public Role<C> {
     std::optional<Motion> command(Time now) const {
         return maybe<Motion>(C::get_command, object(), now);
     }
+    Result<axle_ikeya_mode> mode() const { return get<axle_ikeya_mode>(C::get_mode, object()); }
     Status set_mode(axle_ikeya_mode mode) { return call(C::set_mode, object(), mode); }
     /// As measured, turns per second.
     Status set_velocity(Motors<float, N> rps) { return call(C::set_velocity, object(), rps); }
@@ -435,6 +436,9 @@ class Host : public Role<HostCalls> {
     }
     std::optional<Report> take_report() {
         return maybe<Report>(axle_ucp_host_take_report, object());
+    }
+    std::optional<Report> report() const {
+        return maybe<Report>(axle_ucp_host_get_report, object());
     }
     std::optional<Time> take_round_trip() {
         const auto us = maybe<std::uint32_t>(axle_ucp_host_take_round_trip, object());

@@ -41,7 +41,7 @@ void turn(Velocity velocity) {
     master.discover(now);
     talk(master, slave, now, 500ms, count);
     CHECK(answers > 0 && master.node(2)->health == AXLE_IKEYA_HEALTH_ONLINE);
-    CHECK(!slave.command(now));
+    CHECK(!slave.command(now) && *slave.mode() == AXLE_IKEYA_MODE_VELOCITY);
     CHECK(master.set_velocity(2, velocity, now));
     slave.set_velocity(velocity);
     talk(master, slave, now, 500ms, count);
@@ -68,7 +68,7 @@ static void drive() {
     CHECK(host.set_speed(30, -5, now));
     talk(host, robot, now, 200ms, ignore);
     CHECK(robot.command(now).speed_pct == 30 && robot.command(now).turn_pct == -5);
-    CHECK(host.take_report() && host.robot_state()->is_commanded);
+    CHECK(host.take_report() && host.report() && host.robot_state()->is_commanded);
     CHECK(robot.command(now + 1s).speed_pct == 0);
     host.stop(now);
     talk(host, robot, now, 3s, ignore);

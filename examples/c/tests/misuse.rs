@@ -305,14 +305,15 @@ macro_rules! master {
 }
 
 macro_rules! slave {
-    ($init:ident $size:ident $event:ident $command:ident $set_mode:ident $statistics:ident
-        $counters:ident $velocity:ident($speed:expr) $position:ident($to:expr)) => {{
+    ($init:ident $size:ident $event:ident $command:ident $mode:ident $set_mode:ident
+        $statistics:ident $counters:ident $velocity:ident($speed:expr) $position:ident($to:expr)) => {{
         let mut init = calls! {
             $init($size, 1, AXLE_IKEYA_MODE_VELOCITY, slave_config(), 0);
         };
         let calls = calls! {
             $event(out::<axle_ikeya_slave_event>());
             $command(5, out::<axle_ikeya_motion>());
+            $mode(out::<axle_ikeya_mode>());
             $set_mode(AXLE_IKEYA_MODE_POSITION);
             $statistics(out::<axle_ikeya_slave_statistics>());
             $counters(out::<axle_counters>());
@@ -354,7 +355,7 @@ fn of_masters() -> (Functions<axle_ikeya_master>, Functions<axle_ikeya3_master>)
 
 fn of_slaves() -> (Functions<axle_ikeya_slave>, Functions<axle_ikeya3_slave>) {
     let mut one = slave!(axle_ikeya_slave_init AXLE_IKEYA_SLAVE_SIZE axle_ikeya_slave_poll_event
-        axle_ikeya_slave_get_command axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics
+        axle_ikeya_slave_get_command axle_ikeya_slave_get_mode axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics
         axle_ikeya_slave_get_counters axle_ikeya_slave_set_velocity(1.0)
         axle_ikeya_slave_set_position(axle_ikeya_position::default()));
     one.1.extend(role!(axle_ikeya_slave_handle_input axle_ikeya_slave_handle_old_input
@@ -362,7 +363,7 @@ fn of_slaves() -> (Functions<axle_ikeya_slave>, Functions<axle_ikeya3_slave>) {
         axle_ikeya_slave_handle_transmit axle_ikeya_slave_is_outdated
         axle_ikeya_slave_next_deadline axle_ikeya_slave_get_line_rules));
     let mut three = slave!(axle_ikeya3_slave_init AXLE_IKEYA3_SLAVE_SIZE
-        axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command axle_ikeya3_slave_set_mode
+        axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command axle_ikeya3_slave_get_mode axle_ikeya3_slave_set_mode
         axle_ikeya3_slave_get_statistics axle_ikeya3_slave_get_counters
         axle_ikeya3_slave_set_velocity(speeds()) axle_ikeya3_slave_set_position(positions()));
     three.1.extend(role!(axle_ikeya3_slave_handle_input axle_ikeya3_slave_handle_old_input
@@ -385,6 +386,7 @@ fn of_host() -> Functions<axle_ucp_host> {
         axle_ucp_host_end_firmware_update(5);
         axle_ucp_host_get_robot_state(out::<axle_ucp_robot_state>());
         axle_ucp_host_take_report(out::<axle_ucp_report>());
+        axle_ucp_host_get_report(out::<axle_ucp_report>());
         axle_ucp_host_take_round_trip(out::<u32>());
         axle_ucp_host_set_imu_bias(axle_ucp_imu_bias::default());
         axle_ucp_host_set_mag_bias(axle_ucp_mag_bias::default());

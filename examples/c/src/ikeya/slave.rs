@@ -207,8 +207,8 @@ object! {
 
 /// The functions of a slave with these names, besides those of every role.
 macro_rules! slave {
-    ($slave:ident: $init:ident $event:ident $command:ident $set_mode:ident $statistics:ident
-        $counters:ident) => {
+    ($slave:ident: $init:ident $event:ident $command:ident $mode:ident $set_mode:ident
+        $statistics:ident $counters:ident) => {
         /// Makes a slave with this id, 1 to 8, in this mode. `size` is `sizeof *slave`. Never call
         /// it during another call with the same object.
         #[unsafe(no_mangle)]
@@ -246,6 +246,12 @@ macro_rules! slave {
             get(slave, command, |slave| slave.command(at(now_us)).map(axle_ikeya_motion::of_target))
         }
 
+        /// The mode, one of `AXLE_IKEYA_MODE_`.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $mode(slave: *const $slave, mode: *mut axle_ikeya_mode) -> axle_result {
+            get(slave, mode, |slave| Some(mode_of(slave.mode())))
+        }
+
         /// Changes the mode; the command in force ends.
         #[unsafe(no_mangle)]
         pub extern "C" fn $set_mode(slave: *mut $slave, mode: axle_ikeya_mode) -> axle_result {
@@ -277,7 +283,8 @@ macro_rules! slave {
 
 slave!(axle_ikeya_slave:
     axle_ikeya_slave_init axle_ikeya_slave_poll_event axle_ikeya_slave_get_command
-    axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics axle_ikeya_slave_get_counters);
+    axle_ikeya_slave_get_mode axle_ikeya_slave_set_mode axle_ikeya_slave_get_statistics
+    axle_ikeya_slave_get_counters);
 endpoint!(axle_ikeya_slave:
     axle_ikeya_slave_handle_input axle_ikeya_slave_handle_old_input
     axle_ikeya_slave_handle_timeout axle_ikeya_slave_poll_transmit
@@ -285,7 +292,8 @@ endpoint!(axle_ikeya_slave:
     axle_ikeya_slave_next_deadline axle_ikeya_slave_get_line_rules);
 slave!(axle_ikeya3_slave:
     axle_ikeya3_slave_init axle_ikeya3_slave_poll_event axle_ikeya3_slave_get_command
-    axle_ikeya3_slave_set_mode axle_ikeya3_slave_get_statistics axle_ikeya3_slave_get_counters);
+    axle_ikeya3_slave_get_mode axle_ikeya3_slave_set_mode axle_ikeya3_slave_get_statistics
+    axle_ikeya3_slave_get_counters);
 endpoint!(axle_ikeya3_slave:
     axle_ikeya3_slave_handle_input axle_ikeya3_slave_handle_old_input
     axle_ikeya3_slave_handle_timeout axle_ikeya3_slave_poll_transmit

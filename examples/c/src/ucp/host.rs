@@ -624,6 +624,15 @@ pub extern "C" fn axle_ucp_host_take_report(
     get(host, report, |host| host.take_report().map(Into::into))
 }
 
+/// The latest report, however old; `AXLE_NONE` if there is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_host_get_report(
+    host: *const axle_ucp_host,
+    report: *mut axle_ucp_report,
+) -> axle_result {
+    get(host, report, |host| host.last_report().copied().map(Into::into))
+}
+
 /// Time of the latest ping to its pong, once, microseconds; `AXLE_NONE` if there is no new one.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_take_round_trip(

@@ -548,6 +548,8 @@ fn a_report_and_a_command_are_taken_once() {
         let taken = head.rust_mut().take_report();
         assert_eq!(taken.is_none(), again);
         same(in_c, taken.map(report));
+        let in_c = value(|to| axle_ucp_host_get_report(head.c(), to));
+        same(in_c, head.rust_mut().last_report().copied().map(report));
         let in_c = value(|to| axle_ucp_host_take_round_trip(head.c(), to));
         same(in_c, head.rust_mut().take_round_trip().map(|span| span.as_micros()));
         let now = link.line.now();
