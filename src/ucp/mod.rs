@@ -118,11 +118,13 @@
 //!   [`Host::is_stop_sent`]. A frame that did not reach the line makes the motor command due again,
 //!   twice if the frame was cut off or its flush failed. Whether the robot obeys is in its reports,
 //!   averages of the last 1.1 s ([`HostConfig::rpm_average`]): [`Host::stop_progress`], and
-//!   `await_standstill` of a driver. A robot that has not been heard for 500 ms is told to stand
-//!   still, and commands to move are refused until it is heard again ([`CommandError::LinkDown`]).
-//!   The first frame of a host is a zero motor command, because a vendor robot keeps driving while
-//!   any byte arrives: a restarted host that only pings would keep it moving. To disable this for
-//!   hosts that only listen, clear [`HostConfig::sends_first_stop`].
+//!   `await_standstill` of a driver. A vendor robot that has restarted reports 0 until it moves: if
+//!   its reports show a restart, they show a standstill only [`host::COAST`] later. A robot that
+//!   has not been heard for 500 ms is told to stand still, and commands to move are refused until
+//!   it is heard again ([`CommandError::LinkDown`]). The first frame of a host is a zero motor
+//!   command, because a vendor robot keeps driving while any byte arrives: a restarted host that
+//!   only pings would keep it moving. To disable this for hosts that only listen, clear
+//!   [`HostConfig::sends_first_stop`].
 //!
 //! [`BiasStore`]: host::BiasStore
 //! [`CommandError::LinkDown`]: host::CommandError::LinkDown
