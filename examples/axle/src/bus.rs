@@ -420,8 +420,8 @@ impl<B: Boards> Bus<B> {
         self.stop_while(nodes, |_| true)
     }
 
-    /// The same, but if an answer comes too late, and could be waited for, gives up as soon as each
-    /// id has been asked: from then on, an answer may be that to an older READ.
+    /// The same, but if two answers come too late, and could be waited for, gives up as soon as
+    /// each id has been asked: from then on, an answer may be that to an older READ.
     pub(crate) fn stop_in_time(&mut self, nodes: NodeSet) -> Result<(), Failure> {
         self.stop_while(nodes, |bus| !bus.must_wait_longer())
     }

@@ -47,8 +47,8 @@ use crate::{
 /// --node only, and WRITE packets for those that answer; with --protocol ucp, zero motor commands
 /// and pings. Without --protocol, first the READ packets of one-motor boards, for one second, at
 /// 500000 bit/s; if boards with three motors answer, these are stopped; if nothing answers, then
-/// zero motor commands and pings at 115200 bit/s. Any byte
-/// keeps a vendor robot going for 500 ms, so for a rover --protocol ucp is faster by that second.
+/// zero motor commands and pings at 115200 bit/s. Any byte keeps a vendor robot going for 500 ms,
+/// so for a rover --protocol ucp is faster by that second.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
@@ -214,7 +214,9 @@ impl Stopped {
                     let text = status.map(|it| it.to_string()).unwrap_or_default();
                     tell(args, &Event::Stopped { node: Some(node), status, text });
                 }
-                Halt::Silent if known.contains(node) => self.complaints.push(out_of_time(node)),
+                Halt::Silent if known.contains(node) => self.complaints.push(format!(
+                    "node {node} has answered, but not when it was asked: its motor may be moving"
+                )),
                 Halt::Silent if args.node.is_none() => self.silent.push(node),
                 _ => self.complaints.extend(bus.complaint(node)),
             }
@@ -242,10 +244,6 @@ impl Stopped {
         let heard = if self.damaged > 0 { " (damaged bytes received)" } else { "" };
         format!("no node answers on {:?}{heard}{hint}", self.path)
     }
-}
-
-fn out_of_time(node: NodeId) -> String {
-    format!("node {node} has answered, but not when it was asked: its motor may be moving")
 }
 
 /// READs of an id on a slow line until it counts as silent.
@@ -297,7 +295,7 @@ macro_rules! tell {
 fn heard_on(line: Line, protocol: Protocol) -> (Rc<Cell<Heard>>, Line) {
     type One = ikeya::Decoder<ikeya::ToMaster>;
     type Three = three::Decoder<three::ToMaster>;
-    let answers: [Tell; 2] = match protocol {
+    let [own, other]: [Tell; 2] = match protocol {
         Protocol::Ikeya3 => [
             tell!(Three, |heard, answer| heard.nodes.insert(answer.id())),
             tell!(One, |heard, _answer| heard.others = true),
@@ -309,7 +307,7 @@ fn heard_on(line: Line, protocol: Protocol) -> (Rc<Cell<Heard>>, Line) {
     };
     let requests: Tell =
         tell!(ikeya::Decoder<ikeya::ToSlave>, |heard, _request| heard.requests = true);
-    let mut all = answers.into_iter().chain([requests]).collect::<Vec<_>>();
+    let mut all = [own, other, requests];
     let heard = Rc::new(Cell::new(Heard::default()));
     let tapped = Rc::clone(&heard);
     let line = line.tapped(move |direction, bytes| {
