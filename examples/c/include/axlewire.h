@@ -246,7 +246,8 @@
 /// A valid frame has arrived, the first or the first after a link that was down.
 #define AXLE_UCP_HOST_LINK_UP 1
 
-/// No valid frame has arrived in time; a robot that was told to move is told to stand still (U16).
+/// No valid frame has arrived in time; a robot that was told to move is told to stand still
+/// (U16).
 #define AXLE_UCP_HOST_LINK_DOWN 2
 
 /// The robot answered a ping: `round_trip_us`, `err`.
@@ -394,7 +395,7 @@
 /// Host to robot: `network_state`.
 #define AXLE_UCP_SET_NETWORK_STATE 18
 
-/// The same in four bytes, as some hosts send it: `network_state`. Not to be encoded (ruling U8).
+/// The same in four bytes, as some hosts send it: `network_state`. Not to be encoded (U8).
 #define AXLE_UCP_SET_NETWORK_STATE_WIDE 19
 
 /// A frame of no known message: `id`, `body`, `body_length` (ruling U3).
@@ -438,6 +439,9 @@
 
 /// Size of the object, bytes.
 #define AXLE_UCP_ROBOT_SIZE 1080
+
+/// What a node controls: one of `AXLE_IKEYA_MODE_`.
+typedef uint8_t axle_ikeya_mode;
 
 /// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts. Any
 /// values are a position, the sum of both parts: 2 turns and 8192 counts are 3 turns.
@@ -498,9 +502,6 @@ typedef struct axle_ikeya_master {
   /// Private.
   uint64_t memory[286];
 } axle_ikeya_master;
-
-/// What a node controls: one of `AXLE_IKEYA_MODE_`.
-typedef uint8_t axle_ikeya_mode;
 
 /// Speeds or positions of the motors of a node: measured or commanded.
 ///
@@ -686,6 +687,32 @@ typedef struct axle_ikeya_packet {
   /// Positions.
   struct axle_ikeya_position position[3];
 } axle_ikeya_packet;
+
+/// A bus of boards with one motor, for `axle_ikeya_schedule_get_cycle`.
+typedef struct axle_ikeya_schedule {
+  /// Speed of the line, bit/s; 500,000 by default.
+  uint32_t baud;
+  /// Time from the end of a request to the start of its answer; 50 us by default (ruling I9).
+  uint32_t response_time_us;
+  /// Silence after each packet of the master and after each answer; 0 by default.
+  uint32_t turnaround_gap_us;
+  /// Number of nodes.
+  uint8_t nodes;
+  /// Not 0 if each node is commanded in each cycle, or only read; 1 by default.
+  uint8_t writes;
+} axle_ikeya_schedule;
+
+/// What the master does with each node in turn: a WRITE, if it is commanded, and a READ.
+typedef struct axle_ikeya_cycle {
+  /// Time that one node takes.
+  uint32_t exchange_time_us;
+  /// Time of all nodes: from one turn of a node to its next.
+  uint32_t cycle_time_us;
+  /// Visits to each node per second, rounded down; 0 without nodes.
+  uint32_t cycles_per_second;
+  /// Share of the time in which the line is in use, percent, rounded down.
+  uint32_t busy_pct;
+} axle_ikeya_cycle;
 
 /// Settings of a slave. Begin with those of `axle_ikeya_slave_config_direct` or `_usb_adapter`.
 typedef struct axle_ikeya_slave_config {
@@ -1298,12 +1325,27 @@ extern "C" {
 /// 0xFFFF, the CRC of no bytes, if `data` is null.
 uint16_t axle_crc16(const uint8_t *data, size_t length);
 
+/// The name of a mode, such as "velocity"; "?" for another number.
+const char *axle_ikeya_mode_name(axle_ikeya_mode kind);
+
 /// The position as counts in all.
 int32_t axle_ikeya_position_counts(struct axle_ikeya_position position);
 
 /// The position at so many counts. Both parts have one sign, as in C; fails with
 /// `AXLE_ERROR_POSITION` beyond 32,767 turns and 8,191 counts, or -32,768 turns and -8,191 counts.
 axle_result axle_ikeya_position_from_counts(int32_t counts, struct axle_ikeya_position *position);
+
+/// The name of a kind of event, such as "standing_still"; "?" for another number.
+const char *axle_ikeya_master_event_name(uint8_t kind);
+
+/// The name of a health, such as "online"; "?" for another number.
+const char *axle_ikeya_health_name(uint8_t kind);
+
+/// The name of a cause, such as "silent"; "?" for another number.
+const char *axle_ikeya_cause_name(uint8_t kind);
+
+/// The name of what became of a stop, such as "owed"; "?" for another number.
+const char *axle_ikeya_stop_name(uint8_t kind);
 
 /// Settings for one of the processor's own UARTs: 500 kbit/s, answers within 500 us.
 axle_result axle_ikeya_master_config_direct(struct axle_ikeya_master_config *config);
@@ -1334,6 +1376,12 @@ axle_result axle_ikeya_master_stop(struct axle_ikeya_master *master, uint8_t nod
 
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
 axle_result axle_ikeya_master_stop_all(struct axle_ikeya_master *master, uint64_t now_us);
+
+/// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+/// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
+axle_result axle_ikeya_master_check(const struct axle_ikeya_master *master,
+                                    uint8_t node,
+                                    const struct axle_ikeya_motion *motion);
 
 /// Reads a node soon; an event tells of the answer, or that it failed.
 axle_result axle_ikeya_master_read(struct axle_ikeya_master *master, uint8_t node, uint64_t now_us);
@@ -1444,6 +1492,12 @@ axle_result axle_ikeya3_master_stop(struct axle_ikeya3_master *master,
 
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
 axle_result axle_ikeya3_master_stop_all(struct axle_ikeya3_master *master, uint64_t now_us);
+
+/// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+/// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
+axle_result axle_ikeya3_master_check(const struct axle_ikeya3_master *master,
+                                     uint8_t node,
+                                     const struct axle_ikeya_motion *motion);
 
 /// Reads a node soon; an event tells of the answer, or that it failed.
 axle_result axle_ikeya3_master_read(struct axle_ikeya3_master *master,
@@ -1565,6 +1619,9 @@ axle_result axle_ikeya3_master_set_position(struct axle_ikeya3_master *master,
                                             const struct axle_ikeya_position *positions,
                                             uint64_t now_us);
 
+/// The name of a kind of packet, such as "read"; "?" for another number.
+const char *axle_ikeya_packet_name(uint8_t kind);
+
 /// Writes the packet with its CRC to `to`, which has room for `capacity` bytes, and its length.
 ///
 /// Fails with `AXLE_ERROR_NODE_ID`, `AXLE_ERROR_NOT_FINITE`, `AXLE_ERROR_BUFFER_TOO_SMALL`, or
@@ -1579,11 +1636,21 @@ axle_result axle_ikeya_encode(const struct axle_ikeya_packet *packet,
 /// Fails with `AXLE_ERROR_LENGTH`, `AXLE_ERROR_FIELD`, `AXLE_ERROR_NODE_ID` or `AXLE_ERROR_CRC`.
 axle_result axle_ikeya_parse(const uint8_t *data, size_t length, struct axle_ikeya_packet *packet);
 
+/// A bus of so many nodes with the values by default.
+axle_result axle_ikeya_schedule_default(struct axle_ikeya_schedule *schedule, uint8_t nodes);
+
+/// The shortest cycle of a bus.
+axle_result axle_ikeya_schedule_get_cycle(const struct axle_ikeya_schedule *schedule,
+                                          struct axle_ikeya_cycle *cycle);
+
 /// Settings for one of the processor's own UARTs at 500 kbit/s.
 axle_result axle_ikeya_slave_config_direct(struct axle_ikeya_slave_config *config);
 
 /// Settings for a slave on a host: a USB adapter makes pauses of up to 16 ms.
 axle_result axle_ikeya_slave_config_usb_adapter(struct axle_ikeya_slave_config *config);
+
+/// The name of a kind of event, such as "watchdog"; "?" for another number.
+const char *axle_ikeya_slave_event_name(uint8_t kind);
 
 /// Reads four DIP switches, one bit each: the id of the node and its mode (ruling I2).
 ///
@@ -1776,6 +1843,9 @@ const char *axle_result_name(axle_result result);
 /// What it means, in a few words.
 const char *axle_result_text(axle_result result);
 
+/// The name of a reason, such as "crc"; "?" for another number.
+const char *axle_reason_name(uint8_t kind);
+
 /// Makes an empty decoder of this framing: `AXLE_IKEYA_TO_SLAVE`, `AXLE_IKEYA_TO_MASTER`, or, for a
 /// recording of both, `AXLE_IKEYA_BOTH_DIRECTIONS`; the same with `AXLE_IKEYA3_` for boards with
 /// three motors. `size` is `sizeof *decoder`. Never call it during another call with the same
@@ -1912,6 +1982,23 @@ axle_result axle_ucp_host_config_direct(struct axle_ucp_host_config *config);
 
 /// Settings for a USB adapter.
 axle_result axle_ucp_host_config_usb_adapter(struct axle_ucp_host_config *config);
+
+/// Time within which a calibration request has been acknowledged or has failed, with these
+/// settings.
+axle_result axle_ucp_host_get_calibration_bound(const struct axle_ucp_host_config *config,
+                                                uint32_t *bound_us);
+
+/// The name of a kind of event, such as "link_up"; "?" for another number.
+const char *axle_ucp_host_event_name(uint8_t kind);
+
+/// The name of a failure, such as "refused"; "?" for another number.
+const char *axle_ucp_failure_name(uint8_t kind);
+
+/// The name of the state of a link, such as "up"; "?" for another number.
+const char *axle_ucp_link_name(uint8_t kind);
+
+/// The name of what became of a stop, such as "due"; "?" for another number.
+const char *axle_ucp_stop_name(uint8_t kind);
 
 /// Makes a host without biases. `size` is `sizeof *host`. Never call it during another call with
 /// the same object.
@@ -2052,6 +2139,9 @@ axle_result axle_ucp_host_get_statistics(const struct axle_ucp_host *host,
 axle_result axle_ucp_host_get_counters(const struct axle_ucp_host *host,
                                        struct axle_counters *account);
 
+/// The name of a kind of message, such as "report"; "?" for another number.
+const char *axle_ucp_message_name(uint8_t kind);
+
 /// Writes the frame of a message with its CRC to `to`, which has room for `capacity` bytes, and
 /// its length.
 ///
@@ -2075,6 +2165,9 @@ axle_result axle_ucp_robot_config_direct(struct axle_ucp_robot_config *config);
 
 /// Settings for a robot on a host.
 axle_result axle_ucp_robot_config_usb_adapter(struct axle_ucp_robot_config *config);
+
+/// The name of a kind of event, such as "motor"; "?" for another number.
+const char *axle_ucp_robot_event_name(uint8_t kind);
 
 /// Makes a robot. `size` is `sizeof *robot`. Never call it during another call with the same
 /// object.
@@ -2187,6 +2280,15 @@ axle_result axle_ucp_robot_get_statistics(const struct axle_ucp_robot *robot,
 /// The account of the bytes received.
 axle_result axle_ucp_robot_get_counters(const struct axle_ucp_robot *robot,
                                         struct axle_counters *account);
+
+/// The name of a calibration, such as "imu"; "?" for another number.
+const char *axle_ucp_calibration_name(axle_ucp_calibration kind);
+
+/// The name of an answer to an update, such as "accepted"; "?" for another number.
+const char *axle_ucp_ota_status_name(axle_ucp_ota_status kind);
+
+/// The name of a state of the network, such as "connected"; "?" for another number.
+const char *axle_ucp_network_state_name(axle_ucp_network_state kind);
 
 #ifdef __cplusplus
 }  // extern "C"

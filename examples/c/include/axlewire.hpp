@@ -222,7 +222,7 @@ namespace detail {
     AXLE_CALL(c, discover) AXLE_CALL(c, stop) AXLE_CALL(c, stop_all) AXLE_CALL(c, read)            \
     AXLE_CALL(c, confirm) AXLE_CALL(c, keep_alive) AXLE_CALL(c, release) AXLE_CALL(c, get_node)    \
     AXLE_CALL(c, get_bus) AXLE_CALL(c, get_node_statistics)                                        \
-    AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
+    AXLE_CALL(c, check) AXLE_CALL(c, set_velocity) AXLE_CALL(c, set_position)
 #define AXLE_SLAVE(c)                                                                              \
     AXLE_ROLE(c, axle_ikeya_slave)                                                                 \
     AXLE_CALL(c, get_command) AXLE_CALL(c, get_mode) AXLE_CALL(c, set_mode)                        \
@@ -361,6 +361,9 @@ class Master : public Role<C> {
         return call(C::stop, object(), node, now);
     }
     Status stop_all(Time now) { return call(C::stop_all, object(), now); }
+    Status check(std::uint8_t node, const Motion &motion) const {
+        return call(C::check, object(), node, &motion);
+    }
     [[nodiscard]] Status read(std::uint8_t node, Time now) {
         return call(C::read, object(), node, now);
     }

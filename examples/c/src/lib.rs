@@ -9,6 +9,8 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[macro_use]
+mod kinds;
+#[macro_use]
 mod memory;
 #[macro_use]
 mod endpoint;

@@ -36,16 +36,20 @@ pub const AXLE_STREAM_FRAME: u8 = 1;
 /// A gap: bytes that belong to no frame.
 pub const AXLE_STREAM_SKIPPED: u8 = 2;
 
-/// The CRC does not match.
-pub const AXLE_REASON_CRC: u8 = 1;
-/// Not the first bytes of a frame.
-pub const AXLE_REASON_HEADER: u8 = 2;
-/// A node id outside 1 to 8.
-pub const AXLE_REASON_ID: u8 = 3;
-/// A length that no frame has.
-pub const AXLE_REASON_LENGTH: u8 = 4;
-/// The line went quiet inside the frame.
-pub const AXLE_REASON_IDLE: u8 = 5;
+kinds! {
+    /// The name of a reason, such as "crc"; "?" for another number.
+    axle_reason_name: u8;
+    /// The CRC does not match.
+    AXLE_REASON_CRC = 1, c"crc";
+    /// Not the first bytes of a frame.
+    AXLE_REASON_HEADER = 2, c"header";
+    /// A node id outside 1 to 8.
+    AXLE_REASON_ID = 3, c"id";
+    /// A length that no frame has.
+    AXLE_REASON_LENGTH = 4, c"length";
+    /// The line went quiet inside the frame.
+    AXLE_REASON_IDLE = 5, c"idle";
+}
 
 /// Account of a stream: each received byte is in a frame, in a gap, or still pending.
 #[repr(C)]

@@ -278,8 +278,8 @@ fn speeds() -> *const f32 {
 }
 
 macro_rules! master {
-    ($init:ident $size:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident
-        $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
+    ($init:ident $size:ident $event:ident $discover:ident $stop:ident $stop_all:ident $check:ident
+        $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
         $node_statistics:ident $counters:ident $velocity:ident($speed:expr)
         $position:ident($to:expr)) => {{
         let mut init = calls! { $init($size, master_config(), 0); };
@@ -288,6 +288,7 @@ macro_rules! master {
             $discover(5);
             $stop(1, 5);
             $stop_all(5);
+            $check(1, held(axle_ikeya_motion { mode: AXLE_IKEYA_MODE_VELOCITY, ..Default::default() }));
             $read(1, 5);
             $confirm(1, 5);
             $keep_alive(5);
@@ -329,7 +330,8 @@ type Functions<M> = (Call<M>, Vec<Call<M>>);
 fn of_masters() -> (Functions<axle_ikeya_master>, Functions<axle_ikeya3_master>) {
     let mut one = master!(axle_ikeya_master_init AXLE_IKEYA_MASTER_SIZE
         axle_ikeya_master_poll_event axle_ikeya_master_discover axle_ikeya_master_stop
-        axle_ikeya_master_stop_all axle_ikeya_master_read axle_ikeya_master_confirm
+        axle_ikeya_master_stop_all axle_ikeya_master_check axle_ikeya_master_read
+        axle_ikeya_master_confirm
         axle_ikeya_master_keep_alive axle_ikeya_master_release axle_ikeya_master_get_node
         axle_ikeya_master_get_bus axle_ikeya_master_get_statistics
         axle_ikeya_master_get_node_statistics axle_ikeya_master_get_counters
@@ -341,7 +343,8 @@ fn of_masters() -> (Functions<axle_ikeya_master>, Functions<axle_ikeya3_master>)
         axle_ikeya_master_next_deadline axle_ikeya_master_get_line_rules));
     let mut three = master!(axle_ikeya3_master_init AXLE_IKEYA3_MASTER_SIZE
         axle_ikeya3_master_poll_event axle_ikeya3_master_discover axle_ikeya3_master_stop
-        axle_ikeya3_master_stop_all axle_ikeya3_master_read axle_ikeya3_master_confirm
+        axle_ikeya3_master_stop_all axle_ikeya3_master_check axle_ikeya3_master_read
+        axle_ikeya3_master_confirm
         axle_ikeya3_master_keep_alive axle_ikeya3_master_release axle_ikeya3_master_get_node
         axle_ikeya3_master_get_bus axle_ikeya3_master_get_statistics
         axle_ikeya3_master_get_node_statistics axle_ikeya3_master_get_counters
@@ -474,6 +477,19 @@ fn without_object(seen: &mut BTreeSet<&'static str>) {
     check(calls! { axle_ikeya_slave_config_usb_adapter(); }, slave_config().cast_mut(), seen);
     check(calls! { axle_ucp_host_config_direct(); }, host_config().cast_mut(), seen);
     check(calls! { axle_ucp_host_config_usb_adapter(); }, host_config().cast_mut(), seen);
+    check(
+        calls! { axle_ucp_host_get_calibration_bound(out::<u32>()); },
+        host_config().cast_mut(),
+        seen,
+    );
+    let bound = out::<u32>();
+    assert_eq!(axle_ucp_host_get_calibration_bound(host_config(), bound), AXLE_OK);
+    let expected = axlewire::ucp::host::HostConfig::direct().calibration_bound().as_micros();
+    // SAFETY: the function has written there.
+    assert_eq!(unsafe { bound.read() }, expected);
+    let schedule = || held([0_u64; 4]).cast::<axle_ikeya_schedule>();
+    check(calls! { axle_ikeya_schedule_default(8); }, schedule(), seen);
+    check(calls! { axle_ikeya_schedule_get_cycle(out::<axle_ikeya_cycle>()); }, schedule(), seen);
     check(calls! { axle_ucp_robot_config_direct(); }, robot_config().cast_mut(), seen);
     check(calls! { axle_ucp_robot_config_usb_adapter(); }, robot_config().cast_mut(), seen);
     check(
@@ -501,6 +517,17 @@ fn without_object(seen: &mut BTreeSet<&'static str>) {
     // No results: what they give is said in the header.
     seen.extend(["axle_crc16", "axle_clock32_at", "axle_wire_time_us", "axle_result_name"]);
     seen.extend(["axle_result_text", "axle_ikeya_position_counts"]);
+    macro_rules! names {
+        ($($name:ident)*) => {$(
+            seen.insert(stringify!($name));
+            assert!(!$name(1).is_null() && !$name(254).is_null());
+        )*};
+    }
+    names!(axle_reason_name axle_ikeya_mode_name axle_ikeya_packet_name axle_ikeya_health_name
+        axle_ikeya_cause_name axle_ikeya_stop_name axle_ikeya_master_event_name
+        axle_ikeya_slave_event_name axle_ucp_message_name axle_ucp_host_event_name
+        axle_ucp_robot_event_name axle_ucp_link_name axle_ucp_stop_name axle_ucp_failure_name
+        axle_ucp_calibration_name axle_ucp_ota_status_name axle_ucp_network_state_name);
     assert_eq!(axle_crc16(null_mut(), 9), 0xFFFF);
     assert_eq!(axle_crc16(bytes(), usize::MAX), 0xFFFF);
     assert_eq!(axle_clock32_at(null_mut(), 9), 0);

@@ -4,7 +4,7 @@ use axlewire::{
     endpoint::Endpoint,
     ikeya::{
         Master, NodeId,
-        board::{OneMotor, ThreeMotors},
+        board::{OneMotor, Target, ThreeMotors},
         master::{
             Cause, Health, MasterConfig, MasterEvent, MasterStatistics, NodeSet, NodeStatistics,
             Polling, StopProgress,
@@ -13,7 +13,10 @@ use axlewire::{
     stats::Latency,
 };
 
-use super::{Motors, axle_ikeya_mode, axle_ikeya_motion, axle_ikeya_position, mode_of, node_from};
+use super::{
+    AXLE_IKEYA_MODE_POSITION, AXLE_IKEYA_MODE_VELOCITY, Motors, axle_ikeya_mode, axle_ikeya_motion,
+    axle_ikeya_position, mode_of, node_from,
+};
 use crate::{
     memory::{Memory, Out, enter, get, init, read},
     result::{AXLE_ERROR_VALUE, axle_result, of, of_encode, of_master},
@@ -155,68 +158,84 @@ pub struct axle_ikeya_master_event {
     pub motion: axle_ikeya_motion,
 }
 
-/// A node answered for the first time: `node`, `mode`.
-pub const AXLE_IKEYA_MASTER_DISCOVERED: u8 = 1;
-/// All ids have been asked: `online`.
-pub const AXLE_IKEYA_MASTER_DISCOVERY_DONE: u8 = 2;
-/// An answer: `node`, `motion`.
-pub const AXLE_IKEYA_MASTER_STATUS: u8 = 3;
-/// The health of a node changed: `node`, `health`, `failures`.
-pub const AXLE_IKEYA_MASTER_HEALTH: u8 = 4;
-/// A READ failed after its last attempt: `node`, `cause`.
-pub const AXLE_IKEYA_MASTER_READ_FAILED: u8 = 5;
-/// A node changed its mode, which ends its set-point: `node`, `mode` (ruling I11).
-pub const AXLE_IKEYA_MASTER_MODE_CHANGED: u8 = 6;
-/// The mode of a node is still in doubt after six exchanges: `node` (ruling I11).
-pub const AXLE_IKEYA_MASTER_MODE_IN_DOUBT: u8 = 7;
-/// The set-point that was to be confirmed has arrived: `node`.
-pub const AXLE_IKEYA_MASTER_CONFIRMED: u8 = 8;
-/// It is not known whether it has: `node`, `cause`.
-pub const AXLE_IKEYA_MASTER_NOT_CONFIRMED: u8 = 9;
-/// A stop is confirmed; the motor may still turn: `node` (ruling I12).
-pub const AXLE_IKEYA_MASTER_STOPPED: u8 = 10;
-/// A motor that was stopped is seen to be at rest: `node` (ruling I12).
-pub const AXLE_IKEYA_MASTER_STANDING_STILL: u8 = 11;
-/// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
-pub const AXLE_IKEYA_MASTER_STILL_MOVING: u8 = 12;
-/// The mode of a node that is owed a stop is still in doubt, so the stop is not written: `node`
-/// (rulings I11, I12).
-pub const AXLE_IKEYA_MASTER_STOP_BLOCKED: u8 = 13;
-/// The dead-man has fired (ruling I13).
-pub const AXLE_IKEYA_MASTER_DEAD_MAN: u8 = 14;
-/// An event that is newer than this header.
-pub const AXLE_IKEYA_MASTER_OTHER: u8 = 255;
+kinds! {
+    /// The name of a kind of event, such as "standing_still"; "?" for another number.
+    axle_ikeya_master_event_name: u8;
+    /// A node answered for the first time: `node`, `mode`.
+    AXLE_IKEYA_MASTER_DISCOVERED = 1, c"discovered";
+    /// All ids have been asked: `online`.
+    AXLE_IKEYA_MASTER_DISCOVERY_DONE = 2, c"discovery_done";
+    /// An answer: `node`, `motion`.
+    AXLE_IKEYA_MASTER_STATUS = 3, c"status";
+    /// The health of a node changed: `node`, `health`, `failures`.
+    AXLE_IKEYA_MASTER_HEALTH = 4, c"health";
+    /// A READ failed after its last attempt: `node`, `cause`.
+    AXLE_IKEYA_MASTER_READ_FAILED = 5, c"read_failed";
+    /// A node changed its mode, which ends its set-point: `node`, `mode` (ruling I11).
+    AXLE_IKEYA_MASTER_MODE_CHANGED = 6, c"mode_changed";
+    /// The mode of a node is still in doubt after six exchanges: `node` (ruling I11).
+    AXLE_IKEYA_MASTER_MODE_IN_DOUBT = 7, c"mode_in_doubt";
+    /// The set-point that was to be confirmed has arrived: `node`.
+    AXLE_IKEYA_MASTER_CONFIRMED = 8, c"confirmed";
+    /// It is not known whether it has: `node`, `cause`.
+    AXLE_IKEYA_MASTER_NOT_CONFIRMED = 9, c"not_confirmed";
+    /// A stop is confirmed; the motor may still turn: `node` (ruling I12).
+    AXLE_IKEYA_MASTER_STOPPED = 10, c"stopped";
+    /// A motor that was stopped is seen to be at rest: `node` (ruling I12).
+    AXLE_IKEYA_MASTER_STANDING_STILL = 11, c"standing_still";
+    /// A motor still moves after its time to coast: `node`, `motion` (ruling I12).
+    AXLE_IKEYA_MASTER_STILL_MOVING = 12, c"still_moving";
+    /// The mode of a node that is owed a stop is still in doubt, so the stop is not written: `node`
+    /// (rulings I11, I12).
+    AXLE_IKEYA_MASTER_STOP_BLOCKED = 13, c"stop_blocked";
+    /// The dead-man has fired (ruling I13).
+    AXLE_IKEYA_MASTER_DEAD_MAN = 14, c"dead_man";
+    /// An event that is newer than this header.
+    AXLE_IKEYA_MASTER_OTHER = 255, c"other";
+}
 
-/// Never heard, or not a node of this bus.
-pub const AXLE_IKEYA_HEALTH_UNKNOWN: u8 = 0;
-/// The node answers.
-pub const AXLE_IKEYA_HEALTH_ONLINE: u8 = 1;
-/// The node has missed some answers.
-pub const AXLE_IKEYA_HEALTH_SUSPECT: u8 = 2;
-/// The node no longer answers (ruling I7).
-pub const AXLE_IKEYA_HEALTH_ABNORMAL: u8 = 3;
+kinds! {
+    /// The name of a health, such as "online"; "?" for another number.
+    axle_ikeya_health_name: u8;
+    /// Never heard, or not a node of this bus.
+    AXLE_IKEYA_HEALTH_UNKNOWN = 0, c"unknown";
+    /// The node answers.
+    AXLE_IKEYA_HEALTH_ONLINE = 1, c"online";
+    /// The node has missed some answers.
+    AXLE_IKEYA_HEALTH_SUSPECT = 2, c"suspect";
+    /// The node no longer answers (ruling I7).
+    AXLE_IKEYA_HEALTH_ABNORMAL = 3, c"abnormal";
+}
 
-/// No answer.
-pub const AXLE_IKEYA_CAUSE_SILENT: u8 = 1;
-/// A damaged answer.
-pub const AXLE_IKEYA_CAUSE_DAMAGED: u8 = 2;
-/// Another node, another mode, too early or too late.
-pub const AXLE_IKEYA_CAUSE_UNEXPECTED: u8 = 3;
-/// The set-point to be confirmed was dropped.
-pub const AXLE_IKEYA_CAUSE_DROPPED: u8 = 4;
-/// A cause that is newer than this header.
-pub const AXLE_IKEYA_CAUSE_OTHER: u8 = 255;
+kinds! {
+    /// The name of a cause, such as "silent"; "?" for another number.
+    axle_ikeya_cause_name: u8;
+    /// No answer.
+    AXLE_IKEYA_CAUSE_SILENT = 1, c"silent";
+    /// A damaged answer.
+    AXLE_IKEYA_CAUSE_DAMAGED = 2, c"damaged";
+    /// Another node, another mode, too early or too late.
+    AXLE_IKEYA_CAUSE_UNEXPECTED = 3, c"unexpected";
+    /// The set-point to be confirmed was dropped.
+    AXLE_IKEYA_CAUSE_DROPPED = 4, c"dropped";
+    /// A cause that is newer than this header.
+    AXLE_IKEYA_CAUSE_OTHER = 255, c"other";
+}
 
-/// No stop was asked for.
-pub const AXLE_IKEYA_STOP_NOT_ASKED: u8 = 0;
-/// The stop is owed: not confirmed yet.
-pub const AXLE_IKEYA_STOP_OWED: u8 = 1;
-/// The stop is confirmed; the motor may still turn.
-pub const AXLE_IKEYA_STOP_CONFIRMED: u8 = 2;
-/// The motor is seen to be at rest.
-pub const AXLE_IKEYA_STOP_STANDING_STILL: u8 = 3;
-/// The motor still moves after its time to coast.
-pub const AXLE_IKEYA_STOP_STILL_MOVING: u8 = 4;
+kinds! {
+    /// The name of what became of a stop, such as "owed"; "?" for another number.
+    axle_ikeya_stop_name: u8;
+    /// No stop was asked for.
+    AXLE_IKEYA_STOP_NOT_ASKED = 0, c"not_asked";
+    /// The stop is owed: not confirmed yet.
+    AXLE_IKEYA_STOP_OWED = 1, c"owed";
+    /// The stop is confirmed; the motor may still turn.
+    AXLE_IKEYA_STOP_CONFIRMED = 2, c"confirmed";
+    /// The motor is seen to be at rest.
+    AXLE_IKEYA_STOP_STANDING_STILL = 3, c"standing_still";
+    /// The motor still moves after its time to coast.
+    AXLE_IKEYA_STOP_STILL_MOVING = 4, c"still_moving";
+}
 
 const fn cause_of(cause: Cause) -> u8 {
     match cause {
@@ -522,10 +541,22 @@ fn set_position<B: Motors>(
     of(master.set_position(node, position, at(now_us)).map_err(of_master))
 }
 
+fn target<B: Motors>(motion: axle_ikeya_motion) -> Result<Target<B>, axle_result> {
+    match motion.mode {
+        AXLE_IKEYA_MODE_VELOCITY => {
+            B::velocity(motion.velocity_rps).map(Target::Velocity).map_err(of_encode)
+        }
+        AXLE_IKEYA_MODE_POSITION => {
+            Ok(Target::Position(B::position(motion.position.map(Into::into))))
+        }
+        _ => Err(AXLE_ERROR_VALUE),
+    }
+}
+
 /// The functions of a master with these names, besides those of every role.
 macro_rules! master {
     ($master:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident
-        $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident
+        $check:ident $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident
         $statistics:ident $node_statistics:ident $counters:ident) => {
         /// Makes a master that knows no node yet: call `discover`. `size` is `sizeof *master`.
         /// Never call it during another call with the same object.
@@ -571,6 +602,21 @@ macro_rules! master {
         #[unsafe(no_mangle)]
         pub extern "C" fn $stop_all(master: *mut $master, now_us: u64) -> axle_result {
             of(enter(master, |master| master.stop_all(at(now_us))))
+        }
+
+        /// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+        /// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $check(
+            master: *const $master,
+            node: u8,
+            motion: *const axle_ikeya_motion,
+        ) -> axle_result {
+            let check = || {
+                let (node, target) = (node_from(node)?, target(read(motion)?)?);
+                enter(master, |master| of(master.check(node, &target).map_err(of_master)))
+            };
+            check().unwrap_or_else(|error| error)
         }
 
         /// Reads a node soon; an event tells of the answer, or that it failed.
@@ -658,7 +704,7 @@ macro_rules! master {
 
 master!(axle_ikeya_master:
     axle_ikeya_master_init axle_ikeya_master_poll_event axle_ikeya_master_discover
-    axle_ikeya_master_stop axle_ikeya_master_stop_all axle_ikeya_master_read
+    axle_ikeya_master_stop axle_ikeya_master_stop_all axle_ikeya_master_check axle_ikeya_master_read
     axle_ikeya_master_confirm axle_ikeya_master_keep_alive axle_ikeya_master_release
     axle_ikeya_master_get_node axle_ikeya_master_get_bus axle_ikeya_master_get_statistics
     axle_ikeya_master_get_node_statistics axle_ikeya_master_get_counters);
@@ -669,7 +715,8 @@ endpoint!(axle_ikeya_master:
     axle_ikeya_master_next_deadline axle_ikeya_master_get_line_rules);
 master!(axle_ikeya3_master:
     axle_ikeya3_master_init axle_ikeya3_master_poll_event axle_ikeya3_master_discover
-    axle_ikeya3_master_stop axle_ikeya3_master_stop_all axle_ikeya3_master_read
+    axle_ikeya3_master_stop axle_ikeya3_master_stop_all axle_ikeya3_master_check
+    axle_ikeya3_master_read
     axle_ikeya3_master_confirm axle_ikeya3_master_keep_alive axle_ikeya3_master_release
     axle_ikeya3_master_get_node axle_ikeya3_master_get_bus axle_ikeya3_master_get_statistics
     axle_ikeya3_master_get_node_statistics axle_ikeya3_master_get_counters);

@@ -2,6 +2,7 @@
 
 mod master;
 mod packet;
+mod schedule;
 mod slave;
 
 use axlewire::{
@@ -14,6 +15,7 @@ use axlewire::{
 
 pub use master::*;
 pub use packet::*;
+pub use schedule::*;
 pub use slave::*;
 
 use crate::result::{AXLE_ERROR_VALUE, axle_result, of_encode};
@@ -21,10 +23,14 @@ use crate::result::{AXLE_ERROR_VALUE, axle_result, of_encode};
 /// What a node controls: one of `AXLE_IKEYA_MODE_`.
 pub type axle_ikeya_mode = u8;
 
-/// The speed of its motors.
-pub const AXLE_IKEYA_MODE_VELOCITY: axle_ikeya_mode = 1;
-/// The position of its motors.
-pub const AXLE_IKEYA_MODE_POSITION: axle_ikeya_mode = 2;
+kinds! {
+    /// The name of a mode, such as "velocity"; "?" for another number.
+    axle_ikeya_mode_name: axle_ikeya_mode;
+    /// The speed of its motors.
+    AXLE_IKEYA_MODE_VELOCITY = 1, c"velocity";
+    /// The position of its motors.
+    AXLE_IKEYA_MODE_POSITION = 2, c"position";
+}
 
 /// A position of a motor (ruling I5): `rotation` turns of 8192 counts, and `count` counts. Any
 /// values are a position, the sum of both parts: 2 turns and 8192 counts are 3 turns.

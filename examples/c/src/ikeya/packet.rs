@@ -33,18 +33,22 @@ pub struct axle_ikeya_packet {
 }
 plain!(axle_ikeya_packet);
 
-/// READ: asks a slave for its status.
-pub const AXLE_IKEYA_PACKET_READ: u8 = 1;
-/// WRITE, as parsed: commands a slave in velocity or position mode.
-pub const AXLE_IKEYA_PACKET_WRITE: u8 = 2;
-/// WRITE of `velocity_rps`, for encoding.
-pub const AXLE_IKEYA_PACKET_WRITE_VELOCITY: u8 = 3;
-/// WRITE of `position`, for encoding.
-pub const AXLE_IKEYA_PACKET_WRITE_POSITION: u8 = 4;
-/// The answer of a slave in velocity mode.
-pub const AXLE_IKEYA_PACKET_VELOCITY: u8 = 5;
-/// The answer of a slave in position mode.
-pub const AXLE_IKEYA_PACKET_POSITION: u8 = 6;
+kinds! {
+    /// The name of a kind of packet, such as "read"; "?" for another number.
+    axle_ikeya_packet_name: u8;
+    /// READ: asks a slave for its status.
+    AXLE_IKEYA_PACKET_READ = 1, c"read";
+    /// WRITE, as parsed: commands a slave in velocity or position mode.
+    AXLE_IKEYA_PACKET_WRITE = 2, c"write";
+    /// WRITE of `velocity_rps`, for encoding.
+    AXLE_IKEYA_PACKET_WRITE_VELOCITY = 3, c"write_velocity";
+    /// WRITE of `position`, for encoding.
+    AXLE_IKEYA_PACKET_WRITE_POSITION = 4, c"write_position";
+    /// The answer of a slave in velocity mode.
+    AXLE_IKEYA_PACKET_VELOCITY = 5, c"velocity";
+    /// The answer of a slave in position mode.
+    AXLE_IKEYA_PACKET_POSITION = 6, c"position";
+}
 
 /// Length of the longest packet, bytes.
 pub const AXLE_IKEYA_PACKET_MAX_LENGTH: usize = 16;

@@ -92,12 +92,16 @@ pub struct axle_ikeya_slave_event {
     pub motion: axle_ikeya_motion,
 }
 
-/// A command: `motion`.
-pub const AXLE_IKEYA_SLAVE_COMMAND: u8 = 1;
-/// No valid command for the time of the watchdog: stop the motor.
-pub const AXLE_IKEYA_SLAVE_WATCHDOG: u8 = 2;
-/// An event that is newer than this header.
-pub const AXLE_IKEYA_SLAVE_OTHER: u8 = 255;
+kinds! {
+    /// The name of a kind of event, such as "watchdog"; "?" for another number.
+    axle_ikeya_slave_event_name: u8;
+    /// A command: `motion`.
+    AXLE_IKEYA_SLAVE_COMMAND = 1, c"command";
+    /// No valid command for the time of the watchdog: stop the motor.
+    AXLE_IKEYA_SLAVE_WATCHDOG = 2, c"watchdog";
+    /// An event that is newer than this header.
+    AXLE_IKEYA_SLAVE_OTHER = 255, c"other";
+}
 
 impl<B: Motors> From<SlaveEvent<B>> for axle_ikeya_slave_event {
     fn from(event: SlaveEvent<B>) -> Self {

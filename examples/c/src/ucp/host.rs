@@ -111,6 +111,20 @@ pub extern "C" fn axle_ucp_host_config_usb_adapter(
     Out::new(config).map_or_else(|error| error, |out| out.write(HostConfig::usb_adapter().into()))
 }
 
+/// Time within which a calibration request has been acknowledged or has failed, with these
+/// settings.
+#[unsafe(no_mangle)]
+pub extern "C" fn axle_ucp_host_get_calibration_bound(
+    config: *const axle_ucp_host_config,
+    bound_us: *mut u32,
+) -> axle_result {
+    let get = || {
+        let (out, config) = (Out::new(bound_us)?, HostConfig::from(read(config)?));
+        Ok(out.write(config.calibration_bound().as_micros()))
+    };
+    get().unwrap_or_else(|error| error)
+}
+
 /// A report as received.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -199,52 +213,61 @@ impl Default for axle_ucp_host_event {
     }
 }
 
-/// A valid frame has arrived, the first or the first after a link that was down.
-pub const AXLE_UCP_HOST_LINK_UP: u8 = 1;
-/// No valid frame has arrived in time; a robot that was told to move is told to stand still (U16).
-pub const AXLE_UCP_HOST_LINK_DOWN: u8 = 2;
-/// The robot answered a ping: `round_trip_us`, `err`.
-pub const AXLE_UCP_HOST_PONG: u8 = 3;
-/// A report: `report`.
-pub const AXLE_UCP_HOST_REPORT: u8 = 4;
-/// The application was silent while the robot moved: it is told to stand still (ruling U10).
-pub const AXLE_UCP_HOST_DEAD_MAN: u8 = 5;
-/// The start of a calibration is acknowledged: `calibration`.
-pub const AXLE_UCP_HOST_CALIBRATION_STARTED: u8 = 6;
-/// The end of a calibration is acknowledged, its result follows: `calibration`.
-pub const AXLE_UCP_HOST_CALIBRATION_ENDED: u8 = 7;
-/// A calibration request failed: `calibration`, `step`, `cause`, `err`, `attempts`.
-pub const AXLE_UCP_HOST_CALIBRATION_FAILED: u8 = 8;
-/// The result of a calibration, which the host keeps: `imu_bias`.
-pub const AXLE_UCP_HOST_IMU_BIAS: u8 = 9;
-/// The result of a calibration, which the host keeps: `mag_bias`.
-pub const AXLE_UCP_HOST_MAG_BIAS: u8 = 10;
-/// The robot has booted, and is sent the biases that the host keeps.
-pub const AXLE_UCP_HOST_BIASES_SENT: u8 = 11;
-/// The robot has booted, but biases are missing: `imu_missing`, `mag_missing`.
-pub const AXLE_UCP_HOST_BIASES_MISSING: u8 = 12;
-/// The robot has booted, but `low_ids_only` forbids the answer (ruling U14).
-pub const AXLE_UCP_HOST_BIASES_NOT_ANSWERED: u8 = 13;
-/// A firmware update was given up: its request was not sent.
-pub const AXLE_UCP_HOST_UPDATE_NOT_SENT: u8 = 14;
-/// The robot answered a firmware update request: `ota_status`.
-pub const AXLE_UCP_HOST_UPDATE_ANSWERED: u8 = 15;
-/// A frame of no known message: `id`, `index`, `body`, `body_length` (ruling U3).
-pub const AXLE_UCP_HOST_UNKNOWN: u8 = 16;
-/// An event that is newer than this header.
-pub const AXLE_UCP_HOST_OTHER: u8 = 255;
+kinds! {
+    /// The name of a kind of event, such as "link_up"; "?" for another number.
+    axle_ucp_host_event_name: u8;
+    /// A valid frame has arrived, the first or the first after a link that was down.
+    AXLE_UCP_HOST_LINK_UP = 1, c"link_up";
+    /// No valid frame has arrived in time; a robot that was told to move is told to stand still
+    /// (U16).
+    AXLE_UCP_HOST_LINK_DOWN = 2, c"link_down";
+    /// The robot answered a ping: `round_trip_us`, `err`.
+    AXLE_UCP_HOST_PONG = 3, c"pong";
+    /// A report: `report`.
+    AXLE_UCP_HOST_REPORT = 4, c"report";
+    /// The application was silent while the robot moved: it is told to stand still (ruling U10).
+    AXLE_UCP_HOST_DEAD_MAN = 5, c"dead_man";
+    /// The start of a calibration is acknowledged: `calibration`.
+    AXLE_UCP_HOST_CALIBRATION_STARTED = 6, c"calibration_started";
+    /// The end of a calibration is acknowledged, its result follows: `calibration`.
+    AXLE_UCP_HOST_CALIBRATION_ENDED = 7, c"calibration_ended";
+    /// A calibration request failed: `calibration`, `step`, `cause`, `err`, `attempts`.
+    AXLE_UCP_HOST_CALIBRATION_FAILED = 8, c"calibration_failed";
+    /// The result of a calibration, which the host keeps: `imu_bias`.
+    AXLE_UCP_HOST_IMU_BIAS = 9, c"imu_bias";
+    /// The result of a calibration, which the host keeps: `mag_bias`.
+    AXLE_UCP_HOST_MAG_BIAS = 10, c"mag_bias";
+    /// The robot has booted, and is sent the biases that the host keeps.
+    AXLE_UCP_HOST_BIASES_SENT = 11, c"biases_sent";
+    /// The robot has booted, but biases are missing: `imu_missing`, `mag_missing`.
+    AXLE_UCP_HOST_BIASES_MISSING = 12, c"biases_missing";
+    /// The robot has booted, but `low_ids_only` forbids the answer (ruling U14).
+    AXLE_UCP_HOST_BIASES_NOT_ANSWERED = 13, c"biases_not_answered";
+    /// A firmware update was given up: its request was not sent.
+    AXLE_UCP_HOST_UPDATE_NOT_SENT = 14, c"update_not_sent";
+    /// The robot answered a firmware update request: `ota_status`.
+    AXLE_UCP_HOST_UPDATE_ANSWERED = 15, c"update_answered";
+    /// A frame of no known message: `id`, `index`, `body`, `body_length` (ruling U3).
+    AXLE_UCP_HOST_UNKNOWN = 16, c"unknown";
+    /// An event that is newer than this header.
+    AXLE_UCP_HOST_OTHER = 255, c"other";
+}
 
 /// The start of a calibration.
 pub const AXLE_UCP_STEP_START: u8 = 1;
 /// The end of a calibration.
 pub const AXLE_UCP_STEP_END: u8 = 2;
 
-/// No answer after all attempts.
-pub const AXLE_UCP_FAILURE_NO_ANSWER: u8 = 1;
-/// The robot refused: see `err`.
-pub const AXLE_UCP_FAILURE_REFUSED: u8 = 2;
-/// A cause that is newer than this header.
-pub const AXLE_UCP_FAILURE_OTHER: u8 = 255;
+kinds! {
+    /// The name of a failure, such as "refused"; "?" for another number.
+    axle_ucp_failure_name: u8;
+    /// No answer after all attempts.
+    AXLE_UCP_FAILURE_NO_ANSWER = 1, c"no_answer";
+    /// The robot refused: see `err`.
+    AXLE_UCP_FAILURE_REFUSED = 2, c"refused";
+    /// A cause that is newer than this header.
+    AXLE_UCP_FAILURE_OTHER = 255, c"other";
+}
 
 fn failed(of: CalibrationFailure) -> axle_ucp_host_event {
     let (cause, err) = match of.cause {
@@ -345,23 +368,31 @@ pub struct axle_ucp_robot_state {
     pub calibration_failure: u8,
 }
 
-/// Nothing heard yet.
-pub const AXLE_UCP_LINK_WAITING: u8 = 0;
-/// The robot is heard.
-pub const AXLE_UCP_LINK_UP: u8 = 1;
-/// The robot is no longer heard.
-pub const AXLE_UCP_LINK_DOWN: u8 = 2;
+kinds! {
+    /// The name of the state of a link, such as "up"; "?" for another number.
+    axle_ucp_link_name: u8;
+    /// Nothing heard yet.
+    AXLE_UCP_LINK_WAITING = 0, c"waiting";
+    /// The robot is heard.
+    AXLE_UCP_LINK_UP = 1, c"up";
+    /// The robot is no longer heard.
+    AXLE_UCP_LINK_DOWN = 2, c"down";
+}
 
-/// No stop was asked for.
-pub const AXLE_UCP_STOP_NOT_ASKED: u8 = 0;
-/// The stop has not left yet.
-pub const AXLE_UCP_STOP_DUE: u8 = 1;
-/// The stop has left, and no report shows yet what the robot does.
-pub const AXLE_UCP_STOP_NO_REPORTS: u8 = 2;
-/// Reports show that the robot still moves: see `rpm`.
-pub const AXLE_UCP_STOP_STILL_MOVING: u8 = 3;
-/// Reports show that the robot stands still.
-pub const AXLE_UCP_STOP_STANDING_STILL: u8 = 4;
+kinds! {
+    /// The name of what became of a stop, such as "due"; "?" for another number.
+    axle_ucp_stop_name: u8;
+    /// No stop was asked for.
+    AXLE_UCP_STOP_NOT_ASKED = 0, c"not_asked";
+    /// The stop has not left yet.
+    AXLE_UCP_STOP_DUE = 1, c"due";
+    /// The stop has left, and no report shows yet what the robot does.
+    AXLE_UCP_STOP_NO_REPORTS = 2, c"no_reports";
+    /// Reports show that the robot still moves: see `rpm`.
+    AXLE_UCP_STOP_STILL_MOVING = 3, c"still_moving";
+    /// Reports show that the robot stands still.
+    AXLE_UCP_STOP_STANDING_STILL = 4, c"standing_still";
+}
 
 fn state_of(host: &Host<MemoryStore>) -> axle_ucp_robot_state {
     let (stop, rpm) = match host.stop_progress() {

@@ -86,48 +86,52 @@ impl Default for axle_ucp_message {
     }
 }
 
-/// Host to robot: checks that the robot is there.
-pub const AXLE_UCP_PING: u8 = 1;
-/// Robot to host, answers a ping: `err`.
-pub const AXLE_UCP_PONG: u8 = 2;
-/// Host to robot: `speed_pct`, `turn_pct`, `front_led`.
-pub const AXLE_UCP_MOTOR_CONTROL: u8 = 3;
-/// Host to robot: `calibration`.
-pub const AXLE_UCP_CALIBRATION_START: u8 = 4;
-/// Robot to host: `calibration`, `err`.
-pub const AXLE_UCP_CALIBRATION_START_ACK: u8 = 5;
-/// Host to robot: `calibration`.
-pub const AXLE_UCP_CALIBRATION_END: u8 = 6;
-/// Robot to host: `calibration`, `err`.
-pub const AXLE_UCP_CALIBRATION_END_ACK: u8 = 7;
-/// Robot to host, as robots send it: `telemetry`, `version` (ruling U5).
-pub const AXLE_UCP_REPORT: u8 = 8;
-/// Robot to host, as in the document: `telemetry` (ruling U5).
-pub const AXLE_UCP_DOCUMENT_REPORT: u8 = 9;
-/// Robot to host: the result of a calibration, `imu_bias`.
-pub const AXLE_UCP_IMU_BIAS: u8 = 10;
-/// Host to robot: `err`.
-pub const AXLE_UCP_IMU_BIAS_ACK: u8 = 11;
-/// Robot to host: the result of a calibration, `mag_bias`.
-pub const AXLE_UCP_MAG_BIAS: u8 = 12;
-/// Host to robot: `err`.
-pub const AXLE_UCP_MAG_BIAS_ACK: u8 = 13;
-/// Robot to host: has booted and wants the stored biases.
-pub const AXLE_UCP_BIAS_REQUEST: u8 = 14;
-/// Host to robot: `imu_bias`, `mag_bias`, `err`.
-pub const AXLE_UCP_BIASES: u8 = 15;
-/// Host to robot: `version`. Encoding it begins an update: the robot then stops answering.
-pub const AXLE_UCP_OTA_REQUEST: u8 = 16;
-/// Robot to host: `ota_status`.
-pub const AXLE_UCP_OTA_ACK: u8 = 17;
-/// Host to robot: `network_state`.
-pub const AXLE_UCP_SET_NETWORK_STATE: u8 = 18;
-/// The same in four bytes, as some hosts send it: `network_state`. Not to be encoded (ruling U8).
-pub const AXLE_UCP_SET_NETWORK_STATE_WIDE: u8 = 19;
-/// A frame of no known message: `id`, `body`, `body_length` (ruling U3).
-pub const AXLE_UCP_UNKNOWN: u8 = 20;
-/// A message that is newer than this header.
-pub const AXLE_UCP_OTHER: u8 = 255;
+kinds! {
+    /// The name of a kind of message, such as "report"; "?" for another number.
+    axle_ucp_message_name: u8;
+    /// Host to robot: checks that the robot is there.
+    AXLE_UCP_PING = 1, c"ping";
+    /// Robot to host, answers a ping: `err`.
+    AXLE_UCP_PONG = 2, c"pong";
+    /// Host to robot: `speed_pct`, `turn_pct`, `front_led`.
+    AXLE_UCP_MOTOR_CONTROL = 3, c"motor_control";
+    /// Host to robot: `calibration`.
+    AXLE_UCP_CALIBRATION_START = 4, c"calibration_start";
+    /// Robot to host: `calibration`, `err`.
+    AXLE_UCP_CALIBRATION_START_ACK = 5, c"calibration_start_ack";
+    /// Host to robot: `calibration`.
+    AXLE_UCP_CALIBRATION_END = 6, c"calibration_end";
+    /// Robot to host: `calibration`, `err`.
+    AXLE_UCP_CALIBRATION_END_ACK = 7, c"calibration_end_ack";
+    /// Robot to host, as robots send it: `telemetry`, `version` (ruling U5).
+    AXLE_UCP_REPORT = 8, c"report";
+    /// Robot to host, as in the document: `telemetry` (ruling U5).
+    AXLE_UCP_DOCUMENT_REPORT = 9, c"document_report";
+    /// Robot to host: the result of a calibration, `imu_bias`.
+    AXLE_UCP_IMU_BIAS = 10, c"imu_bias";
+    /// Host to robot: `err`.
+    AXLE_UCP_IMU_BIAS_ACK = 11, c"imu_bias_ack";
+    /// Robot to host: the result of a calibration, `mag_bias`.
+    AXLE_UCP_MAG_BIAS = 12, c"mag_bias";
+    /// Host to robot: `err`.
+    AXLE_UCP_MAG_BIAS_ACK = 13, c"mag_bias_ack";
+    /// Robot to host: has booted and wants the stored biases.
+    AXLE_UCP_BIAS_REQUEST = 14, c"bias_request";
+    /// Host to robot: `imu_bias`, `mag_bias`, `err`.
+    AXLE_UCP_BIASES = 15, c"biases";
+    /// Host to robot: `version`. Encoding it begins an update: the robot then stops answering.
+    AXLE_UCP_OTA_REQUEST = 16, c"ota_request";
+    /// Robot to host: `ota_status`.
+    AXLE_UCP_OTA_ACK = 17, c"ota_ack";
+    /// Host to robot: `network_state`.
+    AXLE_UCP_SET_NETWORK_STATE = 18, c"set_network_state";
+    /// The same in four bytes, as some hosts send it: `network_state`. Not to be encoded (U8).
+    AXLE_UCP_SET_NETWORK_STATE_WIDE = 19, c"set_network_state_wide";
+    /// A frame of no known message: `id`, `body`, `body_length` (ruling U3).
+    AXLE_UCP_UNKNOWN = 20, c"unknown";
+    /// A message that is newer than this header.
+    AXLE_UCP_OTHER = 255, c"other";
+}
 
 /// Length of the longest frame, bytes.
 pub const AXLE_UCP_FRAME_MAX_LENGTH: usize = 64;

@@ -120,26 +120,30 @@ pub struct axle_ucp_robot_event {
     pub by_motor_command: u8,
 }
 
-/// The command has changed: `command`. To move the robot, use `axle_ucp_robot_get_command`.
-pub const AXLE_UCP_ROBOT_MOTOR: u8 = 1;
-/// No valid command for the time of the watchdog: speed and turn are 0 (ruling U10).
-pub const AXLE_UCP_ROBOT_WATCHDOG: u8 = 2;
-/// A calibration is to start: `calibration`, `is_repeated`.
-pub const AXLE_UCP_ROBOT_CALIBRATION_START: u8 = 3;
-/// The calibration is to end, and its result to be handed in: `calibration`.
-pub const AXLE_UCP_ROBOT_CALIBRATION_END: u8 = 4;
-/// The host has the biases of the inertial sensors.
-pub const AXLE_UCP_ROBOT_IMU_BIAS_TAKEN: u8 = 5;
-/// The host has the biases of the magnetometer.
-pub const AXLE_UCP_ROBOT_MAG_BIAS_TAKEN: u8 = 6;
-/// The host has sent its stored biases: `imu_bias`, `mag_bias`, `err`.
-pub const AXLE_UCP_ROBOT_BIASES: u8 = 7;
-/// State of the host's network: `network_state`.
-pub const AXLE_UCP_ROBOT_NETWORK_STATE: u8 = 8;
-/// The host asks for a firmware update: `version`, `by_motor_command`.
-pub const AXLE_UCP_ROBOT_UPDATE_REQUESTED: u8 = 9;
-/// An event that is newer than this header.
-pub const AXLE_UCP_ROBOT_OTHER: u8 = 255;
+kinds! {
+    /// The name of a kind of event, such as "motor"; "?" for another number.
+    axle_ucp_robot_event_name: u8;
+    /// The command has changed: `command`. To move the robot, use `axle_ucp_robot_get_command`.
+    AXLE_UCP_ROBOT_MOTOR = 1, c"motor";
+    /// No valid command for the time of the watchdog: speed and turn are 0 (ruling U10).
+    AXLE_UCP_ROBOT_WATCHDOG = 2, c"watchdog";
+    /// A calibration is to start: `calibration`, `is_repeated`.
+    AXLE_UCP_ROBOT_CALIBRATION_START = 3, c"calibration_start";
+    /// The calibration is to end, and its result to be handed in: `calibration`.
+    AXLE_UCP_ROBOT_CALIBRATION_END = 4, c"calibration_end";
+    /// The host has the biases of the inertial sensors.
+    AXLE_UCP_ROBOT_IMU_BIAS_TAKEN = 5, c"imu_bias_taken";
+    /// The host has the biases of the magnetometer.
+    AXLE_UCP_ROBOT_MAG_BIAS_TAKEN = 6, c"mag_bias_taken";
+    /// The host has sent its stored biases: `imu_bias`, `mag_bias`, `err`.
+    AXLE_UCP_ROBOT_BIASES = 7, c"biases";
+    /// State of the host's network: `network_state`.
+    AXLE_UCP_ROBOT_NETWORK_STATE = 8, c"network_state";
+    /// The host asks for a firmware update: `version`, `by_motor_command`.
+    AXLE_UCP_ROBOT_UPDATE_REQUESTED = 9, c"update_requested";
+    /// An event that is newer than this header.
+    AXLE_UCP_ROBOT_OTHER = 255, c"other";
+}
 
 fn biases(of: Biases) -> axle_ucp_robot_event {
     axle_ucp_robot_event {

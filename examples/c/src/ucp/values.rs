@@ -116,10 +116,14 @@ impl From<axle_ucp_mag_bias> for MagBias {
 /// Sensors to calibrate (ruling U11): one of `AXLE_UCP_CALIBRATION_`; other numbers survive.
 pub type axle_ucp_calibration = u8;
 
-/// The magnetometer; the host must turn the robot meanwhile.
-pub const AXLE_UCP_CALIBRATION_MAGNETOMETER: axle_ucp_calibration = 1;
-/// Accelerometer and gyroscope; the robot must stand still meanwhile.
-pub const AXLE_UCP_CALIBRATION_IMU: axle_ucp_calibration = 2;
+kinds! {
+    /// The name of a calibration, such as "imu"; "?" for another number.
+    axle_ucp_calibration_name: axle_ucp_calibration;
+    /// The magnetometer; the host must turn the robot meanwhile.
+    AXLE_UCP_CALIBRATION_MAGNETOMETER = 1, c"magnetometer";
+    /// Accelerometer and gyroscope; the robot must stand still meanwhile.
+    AXLE_UCP_CALIBRATION_IMU = 2, c"imu";
+}
 
 /// Verdict on a frame that was answered (ruling U12): one of `AXLE_UCP_ERR_`; others survive.
 pub type axle_ucp_err = u8;
@@ -132,26 +136,34 @@ pub const AXLE_UCP_ERR_DAMAGED: axle_ucp_err = 1;
 /// Answer to a firmware update request: one of `AXLE_UCP_OTA_`; other numbers survive.
 pub type axle_ucp_ota_status = u8;
 
-/// The update starts.
-pub const AXLE_UCP_OTA_ACCEPTED: axle_ucp_ota_status = 0;
-/// An unknown error.
-pub const AXLE_UCP_OTA_FAILED: axle_ucp_ota_status = 1;
-/// Not allowed.
-pub const AXLE_UCP_OTA_FORBIDDEN: axle_ucp_ota_status = 2;
+kinds! {
+    /// The name of an answer to an update, such as "accepted"; "?" for another number.
+    axle_ucp_ota_status_name: axle_ucp_ota_status;
+    /// The update starts.
+    AXLE_UCP_OTA_ACCEPTED = 0, c"accepted";
+    /// An unknown error.
+    AXLE_UCP_OTA_FAILED = 1, c"failed";
+    /// Not allowed.
+    AXLE_UCP_OTA_FORBIDDEN = 2, c"forbidden";
+}
 
 /// State of the host's network (ruling U8): one of `AXLE_UCP_NETWORK_`; other numbers survive.
 pub type axle_ucp_network_state = u32;
 
-/// Not known yet.
-pub const AXLE_UCP_NETWORK_UNKNOWN: axle_ucp_network_state = 0;
-/// No SIM card.
-pub const AXLE_UCP_NETWORK_SIM_ABSENT: axle_ucp_network_state = 1;
-/// No network.
-pub const AXLE_UCP_NETWORK_DISCONNECTED: axle_ucp_network_state = 2;
-/// Connected.
-pub const AXLE_UCP_NETWORK_CONNECTED: axle_ucp_network_state = 3;
-/// Firmware update in progress.
-pub const AXLE_UCP_NETWORK_OTA: axle_ucp_network_state = 4;
+kinds! {
+    /// The name of a state of the network, such as "connected"; "?" for another number.
+    axle_ucp_network_state_name: axle_ucp_network_state;
+    /// Not known yet.
+    AXLE_UCP_NETWORK_UNKNOWN = 0, c"unknown";
+    /// No SIM card.
+    AXLE_UCP_NETWORK_SIM_ABSENT = 1, c"sim_absent";
+    /// No network.
+    AXLE_UCP_NETWORK_DISCONNECTED = 2, c"disconnected";
+    /// Connected.
+    AXLE_UCP_NETWORK_CONNECTED = 3, c"connected";
+    /// Firmware update in progress.
+    AXLE_UCP_NETWORK_OTA = 4, c"ota";
+}
 
 #[cfg(test)]
 mod tests {

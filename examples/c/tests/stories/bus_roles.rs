@@ -23,6 +23,7 @@ pub(crate) trait MasterInC: Object {
     fn discover(it: *mut Self, now: u64) -> axle_result;
     fn stop(it: *mut Self, node: u8, now: u64) -> axle_result;
     fn stop_all(it: *mut Self, now: u64) -> axle_result;
+    fn check(it: *const Self, node: u8, motion: &axle_ikeya_motion) -> axle_result;
     fn read(it: *mut Self, node: u8, now: u64) -> axle_result;
     fn confirm(it: *mut Self, node: u8, now: u64) -> axle_result;
     fn keep_alive(it: *mut Self, now: u64) -> axle_result;
@@ -59,8 +60,8 @@ pub(crate) trait SlaveInC: Object {
 }
 
 macro_rules! master {
-    ($it:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $read:ident
-        $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
+    ($it:ident: $init:ident $event:ident $discover:ident $stop:ident $stop_all:ident $check:ident
+        $read:ident $confirm:ident $keep_alive:ident $release:ident $node:ident $bus:ident $statistics:ident
         $node_statistics:ident $counters:ident, $velocity:expr, $position:expr) => {
         impl MasterInC for $it {
             fn init(it: *mut Self, config: &axle_ikeya_master_config, now: u64) -> axle_result {
@@ -77,6 +78,9 @@ macro_rules! master {
             }
             fn stop_all(it: *mut Self, now: u64) -> axle_result {
                 $stop_all(it, now)
+            }
+            fn check(it: *const Self, node: u8, motion: &axle_ikeya_motion) -> axle_result {
+                $check(it, node, motion)
             }
             fn read(it: *mut Self, node: u8, now: u64) -> axle_result {
                 $read(it, node, now)
@@ -192,7 +196,7 @@ object!(axle_ikeya3_slave:
     axle_ikeya3_slave_next_deadline axle_ikeya3_slave_get_line_rules);
 master!(axle_ikeya_master:
     axle_ikeya_master_init axle_ikeya_master_poll_event axle_ikeya_master_discover
-    axle_ikeya_master_stop axle_ikeya_master_stop_all axle_ikeya_master_read
+    axle_ikeya_master_stop axle_ikeya_master_stop_all axle_ikeya_master_check axle_ikeya_master_read
     axle_ikeya_master_confirm axle_ikeya_master_keep_alive axle_ikeya_master_release
     axle_ikeya_master_get_node axle_ikeya_master_get_bus axle_ikeya_master_get_statistics
     axle_ikeya_master_get_node_statistics axle_ikeya_master_get_counters,
@@ -200,7 +204,8 @@ master!(axle_ikeya_master:
     |it, node, to: Positions, now| axle_ikeya_master_set_position(it, node, to[0], now));
 master!(axle_ikeya3_master:
     axle_ikeya3_master_init axle_ikeya3_master_poll_event axle_ikeya3_master_discover
-    axle_ikeya3_master_stop axle_ikeya3_master_stop_all axle_ikeya3_master_read
+    axle_ikeya3_master_stop axle_ikeya3_master_stop_all axle_ikeya3_master_check
+    axle_ikeya3_master_read
     axle_ikeya3_master_confirm axle_ikeya3_master_keep_alive axle_ikeya3_master_release
     axle_ikeya3_master_get_node axle_ikeya3_master_get_bus axle_ikeya3_master_get_statistics
     axle_ikeya3_master_get_node_statistics axle_ikeya3_master_get_counters,
@@ -635,7 +640,15 @@ impl<B: Kind> Twin<Master<B>> {
     #[track_caller]
     pub(crate) fn turn(&mut self, node: NodeId, rps: f32, now: Instant) -> axle_result {
         let speeds = [rps, rps / 2.0, -rps];
-        self.both(
+        let checked = self.check_motion(
+            node,
+            axle_ikeya_motion {
+                mode: AXLE_IKEYA_MODE_VELOCITY,
+                velocity_rps: speeds,
+                ..Default::default()
+            },
+        );
+        let done = self.both(
             |it| B::Master::velocity(it, node.get(), speeds, now.as_micros()),
             |master| match speeds.map(Rps::new) {
                 [Ok(a), Ok(b), Ok(c)] => {
@@ -643,17 +656,33 @@ impl<B: Kind> Twin<Master<B>> {
                 }
                 _ => -22,
             },
-        )
+        );
+        assert_eq!(checked, done);
+        done
+    }
+
+    fn check_motion(&self, node: NodeId, motion: axle_ikeya_motion) -> axle_result {
+        B::Master::check(self.c(), node.get(), &motion)
     }
 
     /// The second and third motor go half as far and backwards.
     #[track_caller]
     pub(crate) fn go_to(&mut self, node: NodeId, counts: i32, now: Instant) -> axle_result {
         let to = [counts, counts / 2, -counts].map(|counts| Position::from_counts(counts).unwrap());
-        self.both(
+        let checked = self.check_motion(
+            node,
+            axle_ikeya_motion {
+                mode: AXLE_IKEYA_MODE_POSITION,
+                position: to.map(position_in_c),
+                ..Default::default()
+            },
+        );
+        let done = self.both(
             |it| B::Master::position(it, node.get(), to.map(position_in_c), now.as_micros()),
             |master| command_error(master.set_position(node, B::position(to), now)),
-        )
+        );
+        assert_eq!(checked, done);
+        done
     }
 }
 
