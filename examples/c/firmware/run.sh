@@ -4,7 +4,7 @@
 # Without a command it runs until Ctrl-C, on a pseudo-terminal whose name it prints. With one it runs
 # while the command does; PORT in it is that pseudo-terminal. With --build it only builds, and prints
 # the name of the image. CC names the compiler, clang or arm-none-eabi-gcc; LIB the library, if it is
-# built already; TWIN=yes takes the node in Rust, to compare.
+# built already; TWIN=yes takes the node in Rust, to compare; IMAGE is run instead of the node.
 set -euo pipefail
 from=$PWD
 cd "$(dirname "$0")"
@@ -18,26 +18,31 @@ build() (
     cd "$1"; shift
     bash "$root/.ci/cross" $core rustc --quiet "$@" --crate-type staticlib >&2
 )
-if [ -n "${TWIN-}" ]; then
-    CARGO_TARGET_DIR=$target/twin build twin --release
-    LIB=$(find "$target/twin" -path "*$core/release/libaxlewire_c_twin.a" | head -1)
-elif [ -z "${LIB-}" ] && [ -f ../lib/$core/libaxlewire.a ]; then # in the zip
-    LIB=../lib/$core/libaxlewire.a target=$PWD
-elif [ -z "${LIB-}" ]; then
-    build "$root" --profile firmware -p axlewire-c --no-default-features
-    LIB=$(find "$target" -path "*$core/firmware/libaxlewire_c.a" | head -1)
-fi
-CC=${CC:-clang}
-case $CC in
-*clang*) machine=(--target=$core -fuse-ld=lld) ;;
-*) machine=(-mthumb -Wl,--no-warn-execstack) ;;
-esac
-image=$target/$name.elf
-"$CC" "${machine[@]}" -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -std=c99 -Os \
-    -Wall -Wextra -Wpedantic -Wconversion -Werror -ffreestanding -ffunction-sections -fdata-sections \
-    -nostdlib -Wl,--gc-sections -T stm32f405.ld -I../include "${sources[@]}" "$LIB" -o "$image"
-# A panic that could happen would be linked.
-if nm "$image" | grep -i 'panic\|unwind'; then echo "the node can panic" >&2; exit 1; fi
+compile() {
+    if [ -n "${TWIN-}" ]; then
+        CARGO_TARGET_DIR=$target/twin build twin --release
+        LIB=$(ls -t "$target"/twin/{.,cross}/$core/release/libaxlewire_c_twin.a 2>/dev/null | head -1) || [ -n "$LIB" ]
+    elif [ -z "${LIB-}" ] && [ -f ../lib/$core/libaxlewire.a ]; then # in the zip
+        LIB=../lib/$core/libaxlewire.a target=$PWD
+    elif [ -z "${LIB-}" ]; then
+        build "$root" --profile firmware -p axlewire-c --no-default-features
+        # The newest: it may have been built with and without rustup's target.
+        LIB=$(ls -t "$target"/{.,cross}/$core/firmware/libaxlewire_c.a 2>/dev/null | head -1) || [ -n "$LIB" ]
+    fi
+    CC=${CC:-clang}
+    case $CC in
+    *clang*) machine=(--target=$core -fuse-ld=lld) ;;
+    *) machine=(-mthumb -Wl,--no-warn-execstack) ;;
+    esac
+    image=$target/$name.elf
+    "$CC" "${machine[@]}" -mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -std=c99 -Os \
+        -Wall -Wextra -Wpedantic -Wconversion -Werror -ffreestanding -ffunction-sections -fdata-sections \
+        -nostdlib -Wl,--gc-sections -T stm32f405.ld -I../include "${sources[@]}" "$LIB" -o "$image"
+    # A panic that could happen would be linked.
+    if nm "$image" | grep -i 'panic\|unwind'; then echo "the node can panic" >&2; exit 1; fi
+}
+image=${IMAGE-}
+[ -n "$image" ] || compile
 if [ "${1-}" = --build ]; then echo "$image"; exit; fi
 
 exec {lines}< <(exec setsid qemu-system-arm -M netduinoplus2 -display none -monitor none \

@@ -35,7 +35,7 @@ int main(int argc, char **argv) {
     const auto begin = bus.now();
     const auto on_event = [](const axle::SerialBus::Event &event) {
         if (event.kind == AXLE_IKEYA_MASTER_HEALTH)
-            std::printf("node %d: health %d\n", event.node, event.health);
+            std::printf("node %d: %s\n", event.node, axle_ikeya_health_name(event.health));
     };
     while (status && !error && !is_over && bus.now() - begin < milliseconds{2000}) {
         error = bus.run_for(milliseconds{250}, on_event);
