@@ -4,8 +4,9 @@ use std::env;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    // Set by cargo-c, which builds the shared library. Of the usual linkers only GNU ld can do it.
-    if env::var_os("CARGO_FEATURE_CAPI").is_some()
+    println!("cargo::rerun-if-env-changed=CARGO_C_CARGO");
+    // Only cargo-c builds a shared library. Of the usual linkers only GNU ld knows the option.
+    if env::var_os("CARGO_C_CARGO").is_some()
         && env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "linux")
     {
         println!("cargo::rustc-cdylib-link-arg=-fuse-ld=bfd");

@@ -138,6 +138,16 @@ impl Input {
         Self::new(Some(path.to_owned()), Box::new(file), whole, progress).unpack(form)
     }
 
+    /// What a reader gives.
+    pub(crate) fn of(reader: Box<dyn Read>) -> Result<Self, Failure> {
+        Self::new(None, reader, None, None).unpack(Form::default())
+    }
+
+    /// Shows no progress.
+    pub(crate) fn hide_progress(&mut self) {
+        self.progress = None;
+    }
+
     fn new(
         path: Option<PathBuf>,
         reader: Box<dyn Read>,

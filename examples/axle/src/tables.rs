@@ -16,10 +16,9 @@ use crate::{
     failure::Failure,
     listing::{Modes, Place, REASONS, Shown, SkippedBytes},
 };
+pub(crate) use column::Cell;
 use column::Unfit;
-#[cfg(feature = "parquet")]
-pub(crate) use column::Values;
-pub(crate) use column::{Cell, Column};
+pub use column::{Column, Values};
 use described::Described;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;
@@ -37,8 +36,8 @@ const DAY_US: u64 = 24 * 60 * 60 * 1_000_000;
 /// Takes in the rows of all tables.
 pub(crate) trait Sink {
     /// Takes in the next rows of a table. They are in the order of `axle decode --json`, which is
-    /// [`Table::numbers`]; rows of other tables may come earlier or later.
-    fn rows(&mut self, table: &Table) -> Result<(), Failure>;
+    /// [`Table::numbers`]; rows of other tables may come earlier or later. It may take them away.
+    fn rows(&mut self, table: &mut Table) -> Result<(), Failure>;
 
     /// Whether each day and line has tables of its own. The rows of a table are then in order
     /// within their partition.
@@ -125,6 +124,11 @@ impl Tables {
             is_full: false,
             unfit: None,
         }
+    }
+
+    /// All tables, of the last partition.
+    pub(crate) fn into_tables(self) -> Vec<Table> {
+        self.all
     }
 
     /// What follows is of the line with this name.

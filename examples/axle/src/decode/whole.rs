@@ -45,15 +45,32 @@ impl Chosen {
         &self,
         input: &mut Input,
         sheet: &mut Sheet,
+        go_on: impl FnMut(Next, &mut Sheet) -> Result<(), Failure>,
+    ) -> Result<Walked, Failure> {
+        let walked = self.walk_over(input, sheet, go_on)?;
+        self.must_have_frames(input, walked)
+    }
+
+    /// The same without the last.
+    fn walk_over(
+        &self,
+        input: &mut Input,
+        sheet: &mut Sheet,
         mut go_on: impl FnMut(Next, &mut Sheet) -> Result<(), Failure>,
     ) -> Result<Walked, Failure> {
         let mut walked = walk(input, self.choice, sheet, |next, sheet| {
             go_on(next, sheet)?;
             Ok(true)
         });
-        if let Some(failure) = walked.broken.take() {
-            return Err(failure);
-        }
+        walked.broken.take().map_or(Ok(walked), Err)
+    }
+
+    /// Fails if there is no frame in what was walked over.
+    pub(crate) fn must_have_frames(
+        &self,
+        input: &Input,
+        walked: Walked,
+    ) -> Result<Walked, Failure> {
         let account = &walked.account;
         if account.frames > 0 {
             return Ok(walked);
@@ -71,8 +88,8 @@ impl Chosen {
     }
 }
 
-/// Decodes a capture into tables, and hands their rows to `sink`. `go_on` is called at least once
-/// for every 16 KB, and ends the walk with its failure.
+/// Decodes a capture into tables, and hands their rows to `sink`, if there are any. `go_on` is
+/// called at least once for every 16 KB, and ends the walk with its failure.
 pub(crate) fn walk_into(
     input: &mut Input,
     chosen: &Chosen,
@@ -81,7 +98,7 @@ pub(crate) fn walk_into(
 ) -> Result<Walked, Failure> {
     let mut sheet = Sheet::new(None);
     sheet.tables = Some(Tables::new(chosen.has_times, sink.takes_partitions()));
-    let walked = chosen.walk(input, &mut sheet, |_, sheet| {
+    let walked = chosen.walk_over(input, &mut sheet, |_, sheet| {
         go_on()?;
         sheet.tables.as_mut().map_or(Ok(()), |tables| tables.give_full(sink))
     })?;

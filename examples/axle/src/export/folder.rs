@@ -45,6 +45,7 @@ pub(super) fn export<F: TableFile>(mut job: Job<'_>) -> Result<Walked, Failure> 
     let mut folder = Folder::<F>::new(path, job.output, in_partitions);
     let go_on = || Job::go_on(&job.signals);
     let walked = decode::walk_into(&mut job.input, &job.chosen, &mut folder, go_on)?;
+    let walked = job.chosen.must_have_frames(&job.input, walked)?;
     folder.finish()?;
     beside.keep()?;
     Ok(walked)
@@ -69,7 +70,7 @@ pub(super) struct Folder<'a, F> {
 }
 
 impl<F: TableFile> Sink for Folder<'_, F> {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
+    fn rows(&mut self, table: &mut Table) -> Result<(), Failure> {
         let key = (table.name.clone(), table.partition.clone());
         if !self.files.contains_key(&key) {
             let file = self.begin(table)?;

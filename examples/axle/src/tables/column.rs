@@ -25,25 +25,33 @@ impl ser::Error for Unfit {
 
 /// A column: its values, where there are any.
 #[derive(Debug)]
-pub(crate) struct Column {
-    pub(crate) name: String,
-    pub(crate) kind: Kind,
+pub struct Column {
+    /// That of the field, with the number or the name of a part of it.
+    pub name: String,
+    /// The type of its values.
+    pub kind: Kind,
     /// The names that occur in a column of names.
-    pub(crate) names: Vec<&'static str>,
+    pub names: Vec<&'static str>,
     /// What 1 is; `none` for what is not measured.
-    pub(crate) unit: &'static str,
-    pub(crate) values: Values,
+    pub unit: &'static str,
+    /// What it is, in a few words.
+    pub meaning: &'static str,
+    /// The rulings that decide it; may be empty.
+    pub source: &'static str,
+    /// Those of the rows that have one.
+    pub values: Values,
     /// Which rows have a value; `None` if all must.
-    pub(crate) present: Option<Vec<bool>>,
+    pub present: Option<Vec<bool>>,
 }
 
 /// The values of the rows that have one.
 #[derive(Debug)]
-pub(crate) enum Values {
+pub enum Values {
     /// Integers of up to 32 bits; a `u32` as the `i32` of the same bits.
     Small(Vec<i32>),
     /// `u64` and times.
     Large(Vec<u64>),
+    /// Measured speeds.
     Float(Vec<f32>),
     /// Places in the list of names.
     Name(Vec<u8>),
@@ -76,7 +84,23 @@ impl Column {
             Kind::Bytes => Values::Bytes(Vec::new(), Vec::new()),
         };
         let present = field.is_optional.then(Vec::new);
-        Self { name, kind: field.kind, names, unit: field.unit, values, present }
+        let &Field { kind, unit, meaning, source, .. } = field;
+        Self { name, kind, names, unit, meaning, source, values, present }
+    }
+
+    /// The column with its rows, which are no longer here.
+    pub(crate) fn take(&mut self) -> Self {
+        let Self { name, kind, names, unit, meaning, source, values, present } = self;
+        Self {
+            name: name.clone(),
+            kind: *kind,
+            names: names.clone(),
+            unit,
+            meaning,
+            source,
+            values: values.take(),
+            present: present.as_mut().map(std::mem::take),
+        }
     }
 
     /// The values of the rows in their order.
@@ -229,6 +253,18 @@ impl Column {
 }
 
 impl Values {
+    /// Moves them out.
+    fn take(&mut self) -> Self {
+        let empty = match self {
+            Self::Small(_) => Self::Small(Vec::new()),
+            Self::Large(_) => Self::Large(Vec::new()),
+            Self::Float(_) => Self::Float(Vec::new()),
+            Self::Name(_) => Self::Name(Vec::new()),
+            Self::Bytes(..) => Self::Bytes(Vec::new(), Vec::new()),
+        };
+        std::mem::replace(self, empty)
+    }
+
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Small(values) => values.len(),

@@ -14,7 +14,7 @@ use crate::{
 struct Lines(BTreeMap<u64, Value>);
 
 impl Sink for Lines {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
+    fn rows(&mut self, table: &mut Table) -> Result<(), Failure> {
         for (row, number) in table.numbers.iter().enumerate() {
             assert!(self.0.insert(*number, line(table, row)).is_none());
         }

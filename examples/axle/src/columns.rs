@@ -1,0 +1,166 @@
+//! Captures as typed columns: what `axle export` writes, for programs that read it in memory.
+//!
+//! Made for the wheel of `examples/python`. It changes with the tool, without notice.
+
+use std::{
+    io::Read,
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+pub use axlewire::{fields::Kind, stream::Counters};
+
+pub use crate::tables::{Column, Values};
+use crate::{
+    args::Protocol,
+    captures,
+    decode::{self, Chosen},
+    failure::Failure,
+    input::{Form, Input},
+    tables::{Sink, Table, Tables},
+};
+
+/// Why a capture could not be read.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub enum Error {
+    /// The file cannot be opened or read.
+    Io(String),
+    /// There is no capture of these protocols in it.
+    Capture(String),
+    /// An argument is wrong.
+    Argument(String),
+    /// The reader has had enough.
+    Stopped,
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        let line = failure.to_string();
+        match failure {
+            Failure::Open { .. } | Failure::Read { .. } => Self::Io(line),
+            Failure::Usage(_) => Self::Argument(line),
+            _ => Self::Capture(line),
+        }
+    }
+}
+
+/// Rows of a table.
+#[derive(Debug)]
+pub struct Batch {
+    /// Protocol and message, such as `ucp.report`; `skipped` for the gaps.
+    pub table: String,
+    /// The number of each row among all frames and gaps of the capture, from 0.
+    pub numbers: Vec<u64>,
+    /// Of the same length; those of place and time first.
+    pub columns: Vec<Column>,
+}
+
+/// What was found in a capture that was read to its end.
+#[derive(Debug)]
+pub struct Summary {
+    /// The account of its bytes.
+    pub account: Counters,
+    /// Packets with a time before that of the packet in front of them.
+    pub times_back: u64,
+    /// Why the capture could not be read to its end, if so; what comes before that was read.
+    pub cut: Option<String>,
+}
+
+/// A capture.
+#[allow(missing_debug_implementations, reason = "it has a reader")]
+pub struct Capture {
+    input: Input,
+    chosen: Chosen,
+}
+
+impl Capture {
+    /// Opens files, and folders of them, which follow each other in the order of time. `protocol`
+    /// names that of raw bytes: `ucp`, `ikeya` or `ikeya3`; without it, it is found out.
+    ///
+    /// # Errors
+    ///
+    /// If a file cannot be opened, or is no capture.
+    pub fn open(paths: &[PathBuf], protocol: Option<&str>) -> Result<Self, Error> {
+        let protocol = named(protocol)?;
+        if paths.is_empty() || paths.iter().any(|path| path == Path::new("-")) {
+            return Err(Error::Argument("a capture has the name of a file".to_owned()));
+        }
+        Self::new(captures::open(paths, Form::default())?, protocol)
+    }
+
+    /// A capture that is read from somewhere else.
+    ///
+    /// # Errors
+    ///
+    /// As [`open`](Self::open).
+    pub fn of(reader: Box<dyn Read>, protocol: Option<&str>) -> Result<Self, Error> {
+        let protocol = named(protocol)?;
+        Self::new(Input::of(reader)?, protocol)
+    }
+
+    fn new(mut input: Input, protocol: Option<Protocol>) -> Result<Self, Error> {
+        input.hide_progress();
+        let chosen = decode::choose(&mut input, protocol)?;
+        Ok(Self { input, chosen })
+    }
+
+    /// The tables that rows can be of, without rows, in the order of the protocols.
+    #[must_use]
+    pub fn empty(&self) -> Vec<Batch> {
+        let mut tables = Tables::new(self.chosen.has_times, false).into_tables();
+        tables.iter_mut().map(take).collect()
+    }
+
+    /// Reads it: `rows` takes each batch, and `go_on` is asked at least once for every 16 KB.
+    ///
+    /// # Errors
+    ///
+    /// If nothing in it is a frame, if it cannot be read, or with those of `rows` and `go_on`.
+    pub fn read(
+        mut self,
+        mut rows: impl FnMut(Batch) -> Result<(), Error>,
+        mut go_on: impl FnMut() -> Result<(), Error>,
+    ) -> Result<Summary, Error> {
+        // Failures of this tool are lines; theirs are kept beside.
+        let theirs = Mutex::new(None);
+        let keep = |error| {
+            theirs.lock().map(|mut kept| *kept = Some(error)).unwrap_or_default();
+            Failure::Failed(String::new())
+        };
+        let mut sink = Taker(|batch| rows(batch).map_err(keep));
+        let walked =
+            decode::walk_into(&mut self.input, &self.chosen, &mut sink, || go_on().map_err(keep));
+        if let Ok(Some(error)) = theirs.into_inner() {
+            return Err(error);
+        }
+        let walked = walked?;
+        let (account, times_back) = (walked.account, walked.times_back);
+        let cut = walked.missing().err().map(|failure| failure.to_string());
+        Ok(Summary { account, times_back, cut })
+    }
+}
+
+fn named(protocol: Option<&str>) -> Result<Option<Protocol>, Error> {
+    let all = [Protocol::Ucp, Protocol::Ikeya, Protocol::Ikeya3];
+    let Some(name) = protocol else { return Ok(None) };
+    let known = all.into_iter().find(|protocol| protocol.name() == name);
+    known.map(Some).ok_or_else(|| {
+        Error::Argument(format!("protocol {name:?} is none of 'ucp', 'ikeya', 'ikeya3'"))
+    })
+}
+
+struct Taker<R>(R);
+
+impl<R: FnMut(Batch) -> Result<(), Failure>> Sink for Taker<R> {
+    fn rows(&mut self, table: &mut Table) -> Result<(), Failure> {
+        (self.0)(take(table))
+    }
+}
+
+fn take(table: &mut Table) -> Batch {
+    Batch {
+        table: table.name.clone(),
+        numbers: std::mem::take(&mut table.numbers),
+        columns: table.columns.iter_mut().map(Column::take).collect(),
+    }
+}

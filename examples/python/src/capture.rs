@@ -1,0 +1,442 @@
+//! Captures: read as a whole, or batch by batch.
+
+use std::{
+    collections::BTreeMap,
+    ffi::CString,
+    io::{self, Cursor, Read},
+    path::PathBuf,
+    sync::{
+        Arc, Mutex,
+        mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel},
+    },
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+
+use arrow_array::{RecordBatch, RecordBatchReader};
+use arrow_schema::{ArrowError, SchemaRef};
+use axle::columns::{self, Batch, Error, Summary};
+use pyo3::{
+    exceptions::{PyKeyError, PyOSError, PyTypeError, PyUserWarning, PyValueError},
+    prelude::*,
+    types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyMemoryView, PyString},
+};
+
+use crate::table::{Schemas, Table, Units, stream};
+
+/// How often a long call looks for Ctrl-C.
+pub(crate) const SIGNALS_EVERY: Duration = Duration::from_millis(20);
+
+/// Batches that a reader may be ahead.
+const AHEAD: usize = 4;
+
+/// Where a capture comes from.
+enum Source {
+    Paths(Vec<PathBuf>),
+    Bytes(Vec<u8>),
+    File(Py<PyAny>),
+}
+
+/// What was passed as a capture: a path, several, bytes, or a file that is open for reading.
+impl Source {
+    fn of(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(bytes) = given.cast::<PyBytes>() {
+            return Ok(Self::Bytes(bytes.as_bytes().to_vec()));
+        }
+        if given.is_instance_of::<PyByteArray>() || given.is_instance_of::<PyMemoryView>() {
+            let bytes = given.py().get_type::<PyBytes>().call1((given,))?;
+            return Ok(Self::Bytes(bytes.cast::<PyBytes>()?.as_bytes().to_vec()));
+        }
+        if given.hasattr("read")? {
+            return Ok(Self::File(given.clone().unbind()));
+        }
+        if given.is_instance_of::<PyString>() || given.hasattr("__fspath__")? {
+            return Ok(Self::Paths(vec![given.extract()?]));
+        }
+        match given.extract::<Vec<PathBuf>>() {
+            Ok(paths) => Ok(Self::Paths(paths)),
+            Err(_) => Err(PyTypeError::new_err(
+                "a capture is a path, a list of paths, bytes, or a file open for reading bytes",
+            )),
+        }
+    }
+
+    fn open(self, protocol: Option<&str>) -> Result<columns::Capture, Error> {
+        match self {
+            Self::Paths(paths) => columns::Capture::open(&paths, protocol),
+            Self::Bytes(bytes) => columns::Capture::of(Box::new(Cursor::new(bytes)), protocol),
+            Self::File(file) => columns::Capture::of(Box::new(PythonFile(file)), protocol),
+        }
+    }
+}
+
+/// A file of Python.
+struct PythonFile(Py<PyAny>);
+
+impl Read for PythonFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        Python::attach(|py| {
+            let read = self.0.bind(py).call_method1("read", (buffer.len(),)).map_err(io_error)?;
+            let bytes = read.cast::<PyBytes>().map_err(|_| {
+                io::Error::other("read() gave no bytes: open the file with mode \"rb\"")
+            })?;
+            let bytes = bytes.as_bytes();
+            let to = buffer
+                .get_mut(..bytes.len())
+                .ok_or_else(|| io::Error::other("read() gave more bytes than asked for"))?;
+            to.copy_from_slice(bytes);
+            Ok(bytes.len())
+        })
+    }
+}
+
+fn io_error(error: PyErr) -> io::Error {
+    io::Error::other(error.to_string())
+}
+
+/// The exception of Python for a failure.
+fn raised(error: Error) -> PyErr {
+    match &error {
+        Error::Io(line) => PyOSError::new_err(line.clone()),
+        _ => PyValueError::new_err(raised_text(&error)),
+    }
+}
+
+fn raised_text(error: &Error) -> String {
+    match error {
+        Error::Io(line) | Error::Capture(line) | Error::Argument(line) => line.clone(),
+        Error::Stopped => "reading was stopped".to_owned(),
+    }
+}
+
+/// A capture that was read: its tables, by message.
+#[pyclass(frozen, module = "axlewire")]
+pub(crate) struct Capture {
+    tables: BTreeMap<String, Arc<Vec<RecordBatch>>>,
+    /// For each batch, the numbers of its rows among all.
+    numbers: BTreeMap<String, Vec<Vec<u64>>>,
+    schemas: Schemas,
+    summary: Summary,
+    /// For plots: the bytes, or where they are.
+    name: String,
+}
+
+/// Reads a capture as a whole.
+#[pyfunction]
+#[pyo3(signature = (source, *, protocol=None, units=None))]
+pub(crate) fn read(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    protocol: Option<String>,
+    units: Option<&str>,
+) -> PyResult<Capture> {
+    let units = Units::named(units)?;
+    let (name, source) = (source.repr()?.to_string(), Source::of(source)?);
+    let signal = Mutex::new(None);
+    let result = py.detach(|| {
+        let capture = source.open(protocol.as_deref())?;
+        let schemas = Schemas::new(&capture.empty(), units);
+        let (mut tables, mut numbers) =
+            (BTreeMap::<_, Vec<_>>::new(), BTreeMap::<_, Vec<_>>::new());
+        let mut next_look = Instant::now();
+        let summary = capture.read(
+            |mut batch| {
+                numbers
+                    .entry(batch.table.clone())
+                    .or_default()
+                    .push(std::mem::take(&mut batch.numbers));
+                let table = batch.table.clone();
+                tables.entry(table).or_default().push(schemas.batch(batch));
+                Ok(())
+            },
+            || {
+                if Instant::now() < next_look {
+                    return Ok(());
+                }
+                next_look = Instant::now() + SIGNALS_EVERY;
+                Python::attach(|py| py.check_signals()).map_err(|raised| {
+                    signal.lock().map(|mut kept| *kept = Some(raised)).unwrap_or_default();
+                    Error::Stopped
+                })
+            },
+        )?;
+        let tables = tables.into_iter().map(|(name, all)| (name, Arc::new(all))).collect();
+        Ok(Capture { tables, numbers, schemas, summary, name })
+    });
+    if let Ok(Some(raised)) = signal.into_inner() {
+        return Err(raised);
+    }
+    let capture = result.map_err(raised)?;
+    if let Some(cut) = &capture.summary.cut {
+        warn(py, cut)?;
+    }
+    Ok(capture)
+}
+
+#[pymethods]
+impl Capture {
+    /// The table of a message: `capture["report"]` or `capture["ucp.report"]`. Empty if no such
+    /// message is in the capture.
+    fn __getitem__(&self, message: &str) -> PyResult<Table> {
+        let name = self.full_name(message)?;
+        let batches = self.tables.get(&name).cloned().unwrap_or_default();
+        Ok(self.schemas.table(&name, batches))
+    }
+
+    fn __contains__(&self, message: &str) -> bool {
+        self.full_name(message).is_ok_and(|name| self.tables.contains_key(&name))
+    }
+
+    fn __len__(&self) -> usize {
+        self.tables.len()
+    }
+
+    fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let names: Vec<_> = self.keys();
+        Ok(names.into_pyobject(py)?.call_method0("__iter__")?.unbind())
+    }
+
+    /// The names of the tables that have rows.
+    fn keys(&self) -> Vec<String> {
+        self.tables.keys().cloned().collect()
+    }
+
+    /// The bytes that belong to no frame, with the reasons.
+    #[getter]
+    fn gaps(&self) -> PyResult<Table> {
+        self.__getitem__("skipped")
+    }
+
+    /// All frames in their order: place, protocol, message and bytes.
+    #[getter]
+    fn frames(&self) -> Table {
+        crate::table::frames(&self.tables, &self.numbers)
+    }
+
+    /// The account of the bytes, as a dictionary.
+    #[getter]
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (dict, account) = (PyDict::new(py), &self.summary.account);
+        dict.set_item("received", account.received)?;
+        dict.set_item("frames", account.frames)?;
+        dict.set_item("framed", account.framed)?;
+        dict.set_item("skipped", account.skipped())?;
+        dict.set_item("times_back", self.summary.times_back)?;
+        dict.set_item("cut", self.summary.cut.clone())?;
+        let messages = PyDict::new(py);
+        for (name, batches) in &self.tables {
+            messages.set_item(name, batches.iter().map(RecordBatch::num_rows).sum::<usize>())?;
+        }
+        dict.set_item("messages", messages)?;
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        let account = &self.summary.account;
+        let tables: Vec<_> = self
+            .tables
+            .iter()
+            .map(|(name, all)| {
+                format!("{name}: {}", all.iter().map(RecordBatch::num_rows).sum::<usize>())
+            })
+            .collect();
+        format!(
+            "<axlewire.Capture {}: {} bytes, {} frames, {} bytes skipped ({})>",
+            self.name,
+            account.received,
+            account.frames,
+            account.skipped(),
+            tables.join(", ")
+        )
+    }
+}
+
+impl Capture {
+    fn full_name(&self, message: &str) -> PyResult<String> {
+        self.schemas.full_name(message, |name| self.tables.contains_key(name)).ok_or_else(|| {
+            PyKeyError::new_err(format!(
+                "no message {message:?}; there are {}",
+                self.schemas.names()
+            ))
+        })
+    }
+}
+
+/// Reads a capture in another thread, batch by batch: memory does not grow with its length.
+#[pyclass(frozen, module = "axlewire")]
+pub(crate) struct Scan {
+    reading: Mutex<Reading>,
+    schemas: Schemas,
+    message: Option<String>,
+}
+
+/// What the other thread gives; `None` once it has ended.
+struct Reading {
+    batches: Option<Receiver<Batch>>,
+    reader: Option<JoinHandle<Result<Summary, Error>>>,
+}
+
+/// Begins to read a capture.
+#[pyfunction]
+#[pyo3(signature = (source, *, protocol=None, message=None, units=None))]
+pub(crate) fn scan(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    protocol: Option<String>,
+    message: Option<&str>,
+    units: Option<&str>,
+) -> PyResult<Scan> {
+    let (units, source) = (Units::named(units)?, Source::of(source)?);
+    let (to, batches) = sync_channel(AHEAD);
+    let (say, said) = sync_channel(1);
+    let reader = thread::spawn(move || run(source, protocol.as_deref(), &say, &to));
+    let mut reading = Reading { batches: Some(batches), reader: Some(reader) };
+    let said = Mutex::new(said);
+    let empty = py.detach(|| said.lock().ok().and_then(|said| said.recv().ok()));
+    let Some(empty) = empty else {
+        py.detach(|| reading.end()).map_err(raised)?;
+        return Err(raised(Error::Stopped));
+    };
+    let schemas = Schemas::new(&empty, units);
+    let message = match message {
+        Some(message) => Some(schemas.full_name(message, |_| false).ok_or_else(|| {
+            PyKeyError::new_err(format!("no message {message:?}; there are {}", schemas.names()))
+        })?),
+        None => None,
+    };
+    Ok(Scan { reading: Mutex::new(reading), schemas, message })
+}
+
+fn run(
+    source: Source,
+    protocol: Option<&str>,
+    say: &SyncSender<Vec<Batch>>,
+    to: &SyncSender<Batch>,
+) -> Result<Summary, Error> {
+    let capture = source.open(protocol)?;
+    say.send(capture.empty()).map_err(|_| Error::Stopped)?;
+    capture.read(|batch| to.send(batch).map_err(|_| Error::Stopped), || Ok(()))
+}
+
+/// What comes next of a capture that is being read.
+enum Next {
+    Batch(Batch),
+    Waits,
+    /// The first time with what was found, then without.
+    End(Option<Summary>),
+}
+
+impl Reading {
+    fn next(&mut self, within: Duration) -> Result<Next, Error> {
+        let Some(batches) = &self.batches else { return Ok(Next::End(None)) };
+        match batches.recv_timeout(within) {
+            Ok(batch) => Ok(Next::Batch(batch)),
+            Err(RecvTimeoutError::Timeout) => Ok(Next::Waits),
+            Err(RecvTimeoutError::Disconnected) => self.end().map(Next::End),
+        }
+    }
+
+    /// Waits for the end of the other thread, which has nothing to send to any more.
+    fn end(&mut self) -> Result<Option<Summary>, Error> {
+        self.batches = None;
+        let Some(reader) = self.reader.take() else { return Ok(None) };
+        let ended = reader.join();
+        ended.map_err(|_| Error::Capture("the reader has ended".to_owned()))?.map(Some)
+    }
+}
+
+impl Scan {
+    /// The next batch of the message, or of any; `None` at the end.
+    fn next_batch(&self, within: Duration) -> Result<Next, Error> {
+        let mut reading = self.reading.lock().map_err(|_| Error::Stopped)?;
+        match reading.next(within)? {
+            Next::Batch(batch) if self.message.as_ref().is_some_and(|it| *it != batch.table) => {
+                Ok(Next::Waits)
+            }
+            next => Ok(next),
+        }
+    }
+}
+
+#[pymethods]
+impl Scan {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Table>> {
+        loop {
+            match py.detach(|| self.next_batch(SIGNALS_EVERY)).map_err(raised)? {
+                Next::Batch(batch) => {
+                    let name = batch.table.clone();
+                    let batches = Arc::new(vec![self.schemas.batch(batch)]);
+                    return Ok(Some(self.schemas.table(&name, batches)));
+                }
+                Next::Waits => py.check_signals()?,
+                Next::End(summary) => {
+                    if let Some(cut) = summary.and_then(|summary| summary.cut) {
+                        warn(py, &cut)?;
+                    }
+                    return Ok(None);
+                }
+            }
+        }
+    }
+
+    /// For whatever takes a stream of Arrow: the rows of one message, in constant memory.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        slf: &Bound<'py, Self>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        drop(requested_schema);
+        let Some(message) = &slf.get().message else {
+            let line = "a stream has rows of one kind: scan(..., message=\"report\")";
+            return Err(PyValueError::new_err(line));
+        };
+        let schema = slf.get().schemas.schema(message);
+        let batches = Batches { scan: slf.clone().unbind(), schema: Arc::clone(&schema) };
+        stream(slf.py(), Box::new(batches))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<axlewire.Scan of {}>", self.message.as_deref().unwrap_or("all messages"))
+    }
+}
+
+/// The batches of a scan, for a program that knows nothing of Python.
+struct Batches {
+    scan: Py<Scan>,
+    schema: SchemaRef,
+}
+
+impl Iterator for Batches {
+    type Item = Result<RecordBatch, ArrowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let scan = self.scan.get();
+        loop {
+            match scan.next_batch(SIGNALS_EVERY) {
+                Ok(Next::Batch(batch)) => return Some(Ok(scan.schemas.batch(batch))),
+                Ok(Next::Waits) => {}
+                Ok(Next::End(_)) => return None,
+                Err(error) => {
+                    let line = raised_text(&error);
+                    return Some(Err(ArrowError::ExternalError(line.into())));
+                }
+            }
+        }
+    }
+}
+
+impl RecordBatchReader for Batches {
+    fn schema(&self) -> SchemaRef {
+        Arc::clone(&self.schema)
+    }
+}
+
+/// What is missing of a capture, as a warning.
+fn warn(py: Python<'_>, cut: &str) -> PyResult<()> {
+    let line = CString::new(cut.replace('\0', " ")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)
+}
