@@ -21,7 +21,9 @@ mkdir "$work/$name"
 places() {
     case $1 in
     thumbv6m-*) echo cortex-m0 cortex-m0plus ;;
-    thumbv7m-*) echo cortex-m3 cortex-m4/fpv4-sp-d16-softfp ;;
+    # Its code runs on the larger ones, too, where numbers are passed as without an FPU.
+    thumbv7m-*) echo cortex-m3 cortex-m4/fpv4-sp-d16-softfp \
+        {cortex-m7,cortex-m33}/fpv5-{sp-,}d16-softfp ;;
     thumbv7em-*) echo {cortex-m4,cortex-m7}{,/fpv4-sp-d16-hard} \
         {cortex-m7,imxrt1062}/fpv5-{sp-,}d16-hard ;;
     thumbv8m*) echo cortex-m33{,/fpv4-sp-d16-hard,/fpv5-sp-d16-hard} ;;

@@ -13,6 +13,8 @@ static axle_ikeya_slave slave;
 static axle_clock32 since_start;
 static uint8_t ring[256];
 static uint16_t taken;
+static uint64_t empty_at; /* when all had been taken */
+static axle_line_rules rules;
 static volatile uint16_t filled; /* DMA writes here next */
 static volatile uint8_t has_ended;
 
@@ -34,16 +36,26 @@ static void begin_to_receive(void) {
     HAL_UARTEx_ReceiveToIdle_DMA(&huart1, ring, sizeof ring);
 }
 
+/* Hands in bytes. After a long step of this loop they may be old: they count as no command, and are
+ * not answered. */
+static void hand_in(const uint8_t *bytes, size_t length) {
+    const uint64_t now = now_us();
+    if (now - empty_at > rules.held_up_after_us)
+        axle_ikeya_slave_handle_old_input(&slave, bytes, length, empty_at, now);
+    else
+        axle_ikeya_slave_handle_input(&slave, bytes, length, now);
+}
+
 /* Hands in what has come since the last call. */
 static void receive(void) {
-    const uint64_t empty_at = now_us();
+    const uint64_t looked_at = now_us();
     const uint16_t end = filled;
     if (end < taken) {
-        axle_ikeya_slave_handle_input(&slave, ring + taken, sizeof ring - taken, now_us());
+        hand_in(ring + taken, sizeof ring - taken);
         taken = 0;
     }
-    axle_ikeya_slave_handle_input(&slave, ring + taken, (size_t)(end - taken), now_us());
-    taken = end;
+    hand_in(ring + taken, (size_t)(end - taken));
+    taken = end, empty_at = looked_at;
     axle_ikeya_slave_handle_timeout(&slave, empty_at);
     if (has_ended) begin_to_receive();
 }
@@ -78,12 +90,14 @@ int main(void) {
     config.watchdog_us = 500000;
     config.two_wire = 1; /* it hears the other nodes, too */
     axle_ikeya_slave_init(&slave, sizeof slave, NODE, AXLE_IKEYA_MODE_VELOCITY, &config, now_us());
+    axle_ikeya_slave_get_line_rules(&slave, &rules);
     begin_to_receive();
-    for (uint64_t step_at = now_us();;) {
+    empty_at = now_us();
+    for (uint64_t step_at = empty_at;;) {
         receive();
         answer();
         if (now_us() < step_at) continue;
-        turn(step_at);
-        step_at += STEP_US;
+        turn(now_us());
+        step_at = now_us() + STEP_US;
     }
 }

@@ -466,7 +466,10 @@ typedef struct axle_ikeya_master_config {
   uint32_t baud;
   /// Longest time from the end of a request on the wire to the start of its answer (ruling I7).
   uint32_t reply_timeout_us;
-  /// Time after a missed answer during which the node is not polled again.
+  /// Time after a missed answer during which the node is not polled again. An answer that is
+  /// later than both is taken for the next one: a motor that turns may then be told to stand
+  /// still, from a measurement of before. Set `reply_timeout_us` for the slowest answer of
+  /// your line.
   uint32_t late_guard_us;
   /// Silence between a request or an answer and the next request, for transceivers that need it;
   /// 0 by default.
@@ -1377,7 +1380,8 @@ axle_result axle_ikeya_master_stop(struct axle_ikeya_master *master, uint8_t nod
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
 axle_result axle_ikeya_master_stop_all(struct axle_ikeya_master *master, uint64_t now_us);
 
-/// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+/// Checks whether a command with this motion would be accepted at the time of the latest
+/// call; sends nothing. The dead-man may have fired since: `handle_timeout` tells. Fails as
 /// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
 axle_result axle_ikeya_master_check(const struct axle_ikeya_master *master,
                                     uint8_t node,
@@ -1493,7 +1497,8 @@ axle_result axle_ikeya3_master_stop(struct axle_ikeya3_master *master,
 /// Stops all nodes of this bus, also those that do not answer (ruling I12).
 axle_result axle_ikeya3_master_stop_all(struct axle_ikeya3_master *master, uint64_t now_us);
 
-/// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+/// Checks whether a command with this motion would be accepted at the time of the latest
+/// call; sends nothing. The dead-man may have fired since: `handle_timeout` tells. Fails as
 /// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
 axle_result axle_ikeya3_master_check(const struct axle_ikeya3_master *master,
                                      uint8_t node,
@@ -1640,6 +1645,9 @@ axle_result axle_ikeya_parse(const uint8_t *data, size_t length, struct axle_ike
 axle_result axle_ikeya_schedule_default(struct axle_ikeya_schedule *schedule, uint8_t nodes);
 
 /// The shortest cycle of a bus.
+///
+/// Fails with `AXLE_ERROR_VALUE` for a `baud` of 0, and `AXLE_ERROR_NODE_ID` for more than 8 nodes
+/// or none. Times that do not fit are `UINT32_MAX`.
 axle_result axle_ikeya_schedule_get_cycle(const struct axle_ikeya_schedule *schedule,
                                           struct axle_ikeya_cycle *cycle);
 
@@ -1837,7 +1845,7 @@ axle_result axle_ikeya3_slave_set_velocity(struct axle_ikeya3_slave *slave, cons
 axle_result axle_ikeya3_slave_set_position(struct axle_ikeya3_slave *slave,
                                            const struct axle_ikeya_position *positions);
 
-/// Its name, such as "AXLE_ERROR_NULL"; "unknown" for a number that is no result.
+/// Its name, such as "AXLE_ERROR_NULL"; "?" for a number that is no result.
 const char *axle_result_name(axle_result result);
 
 /// What it means, in a few words.
@@ -1984,7 +1992,7 @@ axle_result axle_ucp_host_config_direct(struct axle_ucp_host_config *config);
 axle_result axle_ucp_host_config_usb_adapter(struct axle_ucp_host_config *config);
 
 /// Time within which a calibration request has been acknowledged or has failed, with these
-/// settings.
+/// settings; `UINT32_MAX` if that does not fit.
 axle_result axle_ucp_host_get_calibration_bound(const struct axle_ucp_host_config *config,
                                                 uint32_t *bound_us);
 

@@ -13,8 +13,12 @@ int main(int argc, char **argv) {
     using std::chrono::milliseconds;
     if (argc != 4) return std::puts("bus_host PORT TURNING MOVING"), 1;
     std::signal(SIGINT, [](int) { is_over = 1; });
-    const auto turning = static_cast<std::uint8_t>(std::atoi(argv[2]));
-    const auto moving = static_cast<std::uint8_t>(std::atoi(argv[3]));
+    const auto id = [](const char *text) {
+        const int node = text[0] >= '1' && text[0] <= '8' && !text[1] ? text[0] - '0' : 0;
+        return static_cast<std::uint8_t>(node);
+    };
+    const auto turning = id(argv[2]), moving = id(argv[3]);
+    if (!turning || !moving) return std::puts("a node is a number from 1 to 8"), 1;
     axle::SerialBus bus{argv[1]};
     auto error = bus.discover();
     if (error) return std::fprintf(stderr, "%s: %s\n", argv[1], error.message().c_str()), 1;

@@ -11,8 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 #define SECOND 1000000u /* times are microseconds */
-static axle_ikeya_master master;
-static int port;
+static axle_ikeya_master master; static int port;
 
 static uint64_t now_us(void) {
     struct timespec now;
@@ -52,10 +51,11 @@ static int next_event(axle_ikeya_master_event *event, uint64_t until) {
 }
 int main(int argc, char **argv) {
     axle_ikeya_master_config config;
-    axle_ikeya_master_event event = {0};
-    axle_ikeya_node known = {0};
+    axle_ikeya_master_event event = {0}; axle_ikeya_node known = {0};
     const uint8_t node = argc == 4 ? (uint8_t)(argv[2][0] - '0') : 0;
-    if (argc != 4 || argv[2][1]) return puts("bus_master PORT NODE RPS"), 1;
+    char *rest = "?";
+    const float rps = argc == 4 ? strtof(argv[3], &rest) : 0;
+    if (*rest || argv[2][1]) return puts("bus_master PORT NODE RPS"), 1;
     if (open_port(argv[1])) return perror(argv[1]), 1;
     axle_ikeya_master_config_usb_adapter(&config);
     config.polling = AXLE_IKEYA_POLLING_EVERY, config.polling_period_us = SECOND / 10;
@@ -66,7 +66,7 @@ int main(int argc, char **argv) {
     uint64_t end = now_us() + 5 * SECOND;
     while (event.kind != AXLE_IKEYA_MASTER_DISCOVERY_DONE && next_event(&event, end) == 1)
         if (event.kind == AXLE_IKEYA_MASTER_DISCOVERED) printf("found node %u\n", event.node);
-    axle_result r = axle_ikeya_master_set_velocity(&master, node, (float)atof(argv[3]), now_us());
+    axle_result r = axle_ikeya_master_set_velocity(&master, node, rps, now_us());
     if (r) return fprintf(stderr, "node %u: %s\n", node, axle_result_text(r)), 1;
     for (end = now_us() + 2 * SECOND; next_event(&event, end) == 1;)
         if (event.kind == AXLE_IKEYA_MASTER_STATUS && event.node == node)

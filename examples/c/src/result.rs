@@ -18,7 +18,7 @@ macro_rules! results {
     ($($(#[$doc:meta])* $name:ident = $value:literal, $text:literal;)*) => {
         $($(#[$doc])* pub const $name: axle_result = $value;)*
 
-        /// Its name, such as "AXLE_ERROR_NULL"; "unknown" for a number that is no result.
+        /// Its name, such as "AXLE_ERROR_NULL"; "?" for a number that is no result.
         #[unsafe(no_mangle)]
         pub extern "C" fn axle_result_name(result: axle_result) -> *const c_char {
             name(result).as_ptr()
@@ -36,7 +36,7 @@ macro_rules! results {
                     Ok(name) => name,
                     Err(_) => c"",
                 },)*
-                _ => c"unknown",
+                _ => c"?",
             }
         }
 
@@ -205,6 +205,6 @@ mod tests {
                 assert_ne!(text(result), text(other));
             }
         }
-        assert_eq!((name(7), text(i32::MIN)), (c"unknown", c"unknown result"));
+        assert_eq!((name(7), text(i32::MIN)), (c"?", c"unknown result"));
     }
 }

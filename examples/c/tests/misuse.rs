@@ -487,7 +487,11 @@ fn without_object(seen: &mut BTreeSet<&'static str>) {
     let expected = axlewire::ucp::host::HostConfig::direct().calibration_bound().as_micros();
     // SAFETY: the function has written there.
     assert_eq!(unsafe { bound.read() }, expected);
-    let schedule = || held([0_u64; 4]).cast::<axle_ikeya_schedule>();
+    let schedule = || {
+        let schedule = held([0_u64; 4]).cast::<axle_ikeya_schedule>();
+        assert_eq!(axle_ikeya_schedule_default(schedule, 8), AXLE_OK);
+        schedule
+    };
     check(calls! { axle_ikeya_schedule_default(8); }, schedule(), seen);
     check(calls! { axle_ikeya_schedule_get_cycle(out::<axle_ikeya_cycle>()); }, schedule(), seen);
     check(calls! { axle_ucp_robot_config_direct(); }, robot_config().cast_mut(), seen);

@@ -1,9 +1,56 @@
 """Ikeya MD and UCP, two serial protocols for motors and rovers.
 
 Captures as columns of Arrow: `read` and `scan`. Bytes: `Decoder`, `crc16`, and the builders of
-`axlewire.ikeya` and `axlewire.ucp`. A line with motors or a rover: `Bus` and `Rover`.
+`axlewire.ikeya` and `axlewire.ucp`. A line with motors or a rover: `Bus` and `Rover`, also
+simulated ones: `axlewire.sim`.
 """
 
-from axlewire._axlewire import Capture, Scan, Table, __version__, crc16, read, scan
+import atexit
 
-__all__ = ["Capture", "Scan", "Table", "__version__", "crc16", "read", "scan"]
+from axlewire._axlewire import (
+    Bus,
+    Capture,
+    Error,
+    NoAnswer,
+    Node,
+    NotOnline,
+    PortLost,
+    Refused,
+    Report,
+    Reports,
+    Rover,
+    Scan,
+    StillMoving,
+    StopsOwed,
+    Table,
+    __version__,
+    _leave_all,
+    crc16,
+    read,
+    scan,
+)
+
+# Motors that still turn are stopped, and seen to stand still.
+atexit.register(_leave_all)
+
+__all__ = [
+    "Bus",
+    "Capture",
+    "Error",
+    "NoAnswer",
+    "Node",
+    "NotOnline",
+    "PortLost",
+    "Refused",
+    "Report",
+    "Reports",
+    "Rover",
+    "Scan",
+    "StillMoving",
+    "StopsOwed",
+    "Table",
+    "__version__",
+    "crc16",
+    "read",
+    "scan",
+]

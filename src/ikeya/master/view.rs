@@ -122,7 +122,8 @@ impl<B: Board> Master<B> {
         self.node(node).read_outcome()
     }
 
-    /// Checks whether a command would be accepted now.
+    /// Checks whether a command would be accepted at the time of the latest call. The dead-man may
+    /// have fired since: [`handle_timeout`](crate::endpoint::Endpoint::handle_timeout) tells.
     ///
     /// # Errors
     ///

@@ -9,7 +9,7 @@ use core::{
 };
 
 use axlewire::{
-    endpoint::{Endpoint, Transmit, Unsent},
+    endpoint::{Arrival, Endpoint, Transmit, Unsent},
     ikeya::{Mode, NodeId, Rps, Slave, Target, slave::SlaveConfig},
     time::{Duration, Instant, Wrapping32},
 };
@@ -54,6 +54,8 @@ struct Node {
     timer: Wrapping32,
     taken: usize,
     rps: f32,
+    empty_at: Instant,
+    held_up_after: Duration,
 }
 
 impl Node {
@@ -62,20 +64,27 @@ impl Node {
         self.timer.at(unsafe { HAL_Micros() })
     }
 
+    fn hand_in(&mut self, bytes: &[u8]) {
+        let now = self.now();
+        let since = self.empty_at;
+        let is_old = now - since > self.held_up_after;
+        let arrival = if is_old { Arrival::Between { since, now } } else { Arrival::Now(now) };
+        self.slave.handle_input(bytes, arrival);
+    }
+
     fn receive(&mut self) {
-        let empty_at = self.now();
+        let looked_at = self.now();
         let end = usize::from(FILLED.load(Ordering::Relaxed));
         // SAFETY: DMA writes elsewhere in the ring.
         let ring: &[u8; SIZE] = unsafe { &*&raw const RING };
         if end < self.taken {
-            let now = self.now();
-            self.slave.handle_input(ring.get(self.taken..).unwrap_or_default(), now);
+            self.hand_in(ring.get(self.taken..).unwrap_or_default());
             self.taken = 0;
         }
-        let now = self.now();
-        self.slave.handle_input(ring.get(self.taken..end).unwrap_or_default(), now);
+        self.hand_in(ring.get(self.taken..end).unwrap_or_default());
         self.taken = end;
-        self.slave.handle_timeout(empty_at);
+        self.empty_at = looked_at;
+        self.slave.handle_timeout(looked_at);
         if HAS_ENDED.load(Ordering::Relaxed) {
             self.begin_to_receive();
         }
@@ -135,16 +144,19 @@ pub extern "C" fn main() -> c_int {
     // SAFETY: reads a register.
     let begin = timer.at(unsafe { HAL_Micros() });
     let slave = Slave::new(NodeId::N1, Mode::Velocity, config, begin);
-    let mut node = Node { slave, timer, taken: 0, rps: 0.0 };
+    let held_up_after = slave.line_rules().held_up_after.unwrap_or(Duration::MAX);
+    let mut node = Node { slave, timer, taken: 0, rps: 0.0, empty_at: begin, held_up_after };
     node.begin_to_receive();
     let mut step_at = node.now();
+    node.empty_at = step_at;
     loop {
         node.receive();
         node.answer();
         if node.now() < step_at {
             continue;
         }
-        node.turn(step_at);
-        step_at += STEP;
+        let now = node.now();
+        node.turn(now);
+        step_at = node.now() + STEP;
     }
 }

@@ -35,7 +35,10 @@ pub struct axle_ikeya_master_config {
     pub baud: u32,
     /// Longest time from the end of a request on the wire to the start of its answer (ruling I7).
     pub reply_timeout_us: u32,
-    /// Time after a missed answer during which the node is not polled again.
+    /// Time after a missed answer during which the node is not polled again. An answer that is
+    /// later than both is taken for the next one: a motor that turns may then be told to stand
+    /// still, from a measurement of before. Set `reply_timeout_us` for the slowest answer of
+    /// your line.
     pub late_guard_us: u32,
     /// Silence between a request or an answer and the next request, for transceivers that need it;
     /// 0 by default.
@@ -604,7 +607,8 @@ macro_rules! master {
             of(enter(master, |master| master.stop_all(at(now_us))))
         }
 
-        /// Checks whether a command with this motion would be accepted now; sends nothing. Fails as
+        /// Checks whether a command with this motion would be accepted at the time of the latest
+        /// call; sends nothing. The dead-man may have fired since: `handle_timeout` tells. Fails as
         /// the command would, and with `AXLE_ERROR_VALUE` for a mode of another number.
         #[unsafe(no_mangle)]
         pub extern "C" fn $check(

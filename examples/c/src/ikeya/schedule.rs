@@ -1,10 +1,10 @@
 //! How fast a bus can be, before it is wired.
 
-use axlewire::ikeya::master::Schedule;
+use axlewire::ikeya::{NodeId, master::Schedule};
 
 use crate::{
     memory::{Out, read},
-    result::axle_result,
+    result::{AXLE_ERROR_VALUE, axle_result, of_encode},
     time::span,
 };
 
@@ -59,6 +59,9 @@ pub extern "C" fn axle_ikeya_schedule_default(
 }
 
 /// The shortest cycle of a bus.
+///
+/// Fails with `AXLE_ERROR_VALUE` for a `baud` of 0, and `AXLE_ERROR_NODE_ID` for more than 8 nodes
+/// or none. Times that do not fit are `UINT32_MAX`.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ikeya_schedule_get_cycle(
     schedule: *const axle_ikeya_schedule,
@@ -66,6 +69,10 @@ pub extern "C" fn axle_ikeya_schedule_get_cycle(
 ) -> axle_result {
     let get = || {
         let (out, of) = (Out::new(cycle)?, read(schedule)?);
+        if of.baud == 0 {
+            return Err(AXLE_ERROR_VALUE);
+        }
+        NodeId::new(of.nodes).map_err(of_encode)?;
         let mut bus = Schedule::new(of.nodes);
         bus.writes = of.writes != 0;
         bus.baud = of.baud;
@@ -84,6 +91,7 @@ pub extern "C" fn axle_ikeya_schedule_get_cycle(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::result::AXLE_ERROR_NODE_ID;
 
     #[test]
     fn eight_nodes_are_visited_277_times_per_second_as_in_rust() {
@@ -106,5 +114,11 @@ mod tests {
         bus = axle_ikeya_schedule { baud: 250_000, turnaround_gap_us: 100, writes: 0, ..bus };
         axle_ikeya_schedule_get_cycle(&bus, &mut cycle);
         assert_eq!(cycle.exchange_time_us, 160 + 50 + 320 + 100);
+        for (nodes, baud, error) in
+            [(0, 1, AXLE_ERROR_NODE_ID), (9, 1, AXLE_ERROR_NODE_ID), (8, 0, AXLE_ERROR_VALUE)]
+        {
+            let bus = axle_ikeya_schedule { nodes, baud, ..bus };
+            assert_eq!(axle_ikeya_schedule_get_cycle(&bus, &mut cycle), error);
+        }
     }
 }

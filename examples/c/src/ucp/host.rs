@@ -112,7 +112,7 @@ pub extern "C" fn axle_ucp_host_config_usb_adapter(
 }
 
 /// Time within which a calibration request has been acknowledged or has failed, with these
-/// settings.
+/// settings; `UINT32_MAX` if that does not fit.
 #[unsafe(no_mangle)]
 pub extern "C" fn axle_ucp_host_get_calibration_bound(
     config: *const axle_ucp_host_config,

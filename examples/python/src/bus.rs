@@ -1,0 +1,400 @@
+//! A motor bus.
+
+use std::{
+    io,
+    sync::{Arc, Weak},
+    time::{Duration as Wait, Instant},
+};
+
+use axlewire::{
+    drive::{self, DriveError},
+    ikeya::{
+        Mode, NodeId, Position, Rps,
+        board::{Status, Target},
+        master::{Health, MasterConfig, MasterStatistics, NodeSet, StopProgress},
+    },
+    time::Duration,
+};
+use pyo3::{
+    exceptions::{PyKeyError, PyOSError, PyValueError},
+    prelude::*,
+    types::{PyDict, PyType},
+};
+
+use crate::{
+    capture::SIGNALS_EVERY,
+    trouble::Trouble,
+    worker::{Driven, Leave, Worker, remember},
+};
+
+/// A moment in which the line is served between two jobs.
+const MOMENT: Duration = Duration::from_millis(5);
+
+struct Driver {
+    bus: drive::Bus,
+    /// Nodes that had a set-point.
+    moved: NodeSet,
+}
+
+type Failed = DriveError<io::Error>;
+
+impl Driven for Driver {
+    fn serve(&mut self) -> Result<(), Trouble> {
+        Ok(self.bus.run_for(MOMENT, |_, _, _| {})?)
+    }
+
+    fn leave(&mut self) -> Result<(), Trouble> {
+        let master = self.bus.role();
+        let owed = if self.moved.is_empty() { NodeSet::default() } else { master.stops_owed() };
+        let nodes: NodeSet = self.moved.iter().chain(owed.iter()).collect();
+        if nodes.is_empty() { Ok(()) } else { Ok(self.bus.stop(nodes)?) }
+    }
+}
+
+impl Driver {
+    /// Remembers a node that a command may move, unless the command is refused.
+    fn may_move(&mut self, id: NodeId, target: Target) -> Result<(), Failed> {
+        self.bus.role().check(id, &target)?;
+        self.moved = self.moved.iter().chain([id]).collect();
+        Ok(())
+    }
+}
+
+/// A span in seconds.
+pub(crate) fn span(seconds: f64) -> PyResult<Duration> {
+    let longest = f64::from(u32::MAX) / 1e6;
+    if (0.0..=longest).contains(&seconds) {
+        Ok(Duration::from_micros((seconds * 1e6) as u32))
+    } else {
+        Err(PyValueError::new_err(format!("{seconds} s is not a time from 0 to {longest:.0} s")))
+    }
+}
+
+fn id(node: u8) -> PyResult<NodeId> {
+    NodeId::new(node).map_err(|error| PyKeyError::new_err(error.to_string()))
+}
+
+/// A motor bus on a serial port (Ikeya MD, boards with one motor).
+///
+/// Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of the
+/// program, and when the object is collected. Between calls a thread of its own serves the line.
+/// Call something at least every `dead_man_s`, or `wait`: else the motors are stopped, because
+/// whoever is at the keyboard may have gone.
+#[pyclass(frozen, weakref, module = "axlewire")]
+pub(crate) struct Bus {
+    worker: Arc<Worker<Driver>>,
+    port: String,
+}
+
+#[pymethods]
+impl Bus {
+    #[new]
+    #[pyo3(signature = (port, *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None))]
+    fn new(
+        py: Python<'_>,
+        port: &Bound<'_, PyAny>,
+        nodes: Option<Vec<u8>>,
+        baud: u32,
+        dead_man_s: Option<f64>,
+        reply_timeout_s: Option<f64>,
+    ) -> PyResult<Self> {
+        let path: std::path::PathBuf = port.extract()?;
+        let port = path.to_string_lossy().into_owned();
+        let mut config = MasterConfig::usb_adapter();
+        config.baud = baud;
+        config.dead_man = dead_man_s.map(span).transpose()?;
+        if let Some(seconds) = reply_timeout_s {
+            config.reply_timeout = span(seconds)?;
+        }
+        if let Some(nodes) = nodes {
+            let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
+            config.nodes = nodes?.into_iter().collect();
+        }
+        let opened = py.detach(|| drive::Bus::open_with(&port, config));
+        let bus = opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
+        let worker = Arc::new(Worker::new(Driver { bus, moved: NodeSet::default() }));
+        let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
+        remember(weak);
+        Ok(Self { worker, port })
+    }
+
+    /// Asks all ids, and returns the nodes that answer with their modes.
+    fn discover<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = self.call(py, |driver| {
+            driver.bus.discover().map(|nodes| nodes.into_iter().collect::<Vec<_>>())
+        })?;
+        let all = PyDict::new(py);
+        for (node, mode) in found {
+            all.set_item(node.get(), name(mode))?;
+        }
+        Ok(all)
+    }
+
+    /// A node by its id, 1 to 8.
+    fn __getitem__(slf: &Bound<'_, Self>, node: u8) -> PyResult<Node> {
+        Ok(Node { bus: slf.clone().unbind(), id: id(node)? })
+    }
+
+    /// The ids of the nodes that are online.
+    #[getter]
+    fn online(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
+        self.worker.call(py, |driver| {
+            let master = driver.bus.role();
+            let is_online = |node: &NodeId| {
+                matches!(master.health(*node), Some(Health::Online | Health::Suspect(_)))
+            };
+            NodeId::ALL.into_iter().filter(is_online).map(|it| it.get().into()).collect()
+        })
+    }
+
+    /// Stops these nodes, or all that were moved, and returns when their motors are seen to stand
+    /// still. Raises `StopsOwed` or `StillMoving` with the nodes whose motors may be moving.
+    #[pyo3(signature = (*nodes))]
+    fn stop(&self, py: Python<'_>, nodes: Vec<u8>) -> PyResult<()> {
+        let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
+        let nodes: NodeSet = nodes?.into_iter().collect();
+        self.call(py, move |driver| {
+            let nodes = if nodes.is_empty() { driver.moved } else { nodes };
+            if nodes.is_empty() { Ok(()) } else { driver.bus.stop(nodes) }
+        })
+    }
+
+    /// Stops every node that may be on this bus, heard or not.
+    fn stop_all(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, |driver| driver.bus.stop_all())
+    }
+
+    /// Waits, and tells the dead-man that somebody is there.
+    fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let end = Instant::now() + Wait::from_micros(span(seconds)?.as_micros().into());
+        loop {
+            self.keep_alive(py)?;
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            py.detach(|| std::thread::sleep(left.min(SIGNALS_EVERY)));
+            py.check_signals()?;
+        }
+    }
+
+    /// Tells the dead-man that somebody is there.
+    fn keep_alive(&self, py: Python<'_>) -> PyResult<()> {
+        self.worker.call(py, alive)
+    }
+
+    /// The counts so far, as a dictionary.
+    #[getter]
+    fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let MasterStatistics { reads, writes, stale_bytes, dead_man, .. } =
+            self.worker.call(py, |driver| *driver.bus.role().statistics())?;
+        let all = PyDict::new(py);
+        all.set_item("reads", reads)?;
+        all.set_item("writes", writes)?;
+        all.set_item("stale_bytes", stale_bytes)?;
+        all.set_item("dead_man", dead_man)?;
+        Ok(all)
+    }
+
+    /// Stops what was moved, waits until it is seen to stand still, and closes the port.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        leave(py, &*self.worker)
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    #[pyo3(signature = (kind, value, trace))]
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        kind: Option<Bound<'_, PyType>>,
+        value: Option<Bound<'_, PyAny>>,
+        trace: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<bool> {
+        drop((kind, value, trace));
+        self.close(py)?;
+        Ok(false)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<axlewire.Bus on {}>", self.port)
+    }
+}
+
+/// A call counts as a sign of life.
+fn alive(driver: &mut Driver) {
+    let now = driver.bus.now();
+    driver.bus.role_mut().keep_alive(now);
+}
+
+/// Leaves a line: a wait that Ctrl-C ends, while the thread goes on stopping.
+pub(crate) fn leave<D: Driven>(py: Python<'_>, worker: &Worker<D>) -> PyResult<()> {
+    worker.dismiss();
+    loop {
+        match worker.left() {
+            Some(left) => return left.map_err(|trouble| trouble.raised(py)),
+            None => py.detach(|| std::thread::sleep(SIGNALS_EVERY / 4)),
+        }
+        py.check_signals()?;
+    }
+}
+
+/// Leaves a line whose object is collected: there is nobody to raise to.
+pub(crate) fn leave_collected<D: Driven>(worker: &Worker<D>) {
+    worker.dismiss();
+    let left = Python::try_attach(|py| {
+        if let Err(trouble) = py.detach(|| worker.leave()) {
+            trouble.raised(py).write_unraisable(py, None);
+        }
+    });
+    if left.is_none() {
+        let _ = worker.leave();
+    }
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        leave_collected(&*self.worker);
+    }
+}
+
+impl Bus {
+    fn call<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(&mut Driver) -> Result<T, Failed> + Send + 'static,
+    ) -> PyResult<T> {
+        let result = self.worker.call(py, move |driver| {
+            alive(driver);
+            job(driver).map_err(Trouble::from)
+        })?;
+        result.map_err(|trouble| trouble.raised(py))
+    }
+}
+
+const fn name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Velocity => "velocity",
+        Mode::Position => "position",
+    }
+}
+
+/// A node of a bus: `bus[1]`.
+#[pyclass(frozen, module = "axlewire")]
+pub(crate) struct Node {
+    bus: Py<Bus>,
+    id: NodeId,
+}
+
+impl Node {
+    fn read(&self, py: Python<'_>) -> PyResult<Status> {
+        let id = self.id;
+        self.bus.get().call(py, move |driver| driver.bus.read(id))
+    }
+}
+
+#[pymethods]
+impl Node {
+    /// Its id, 1 to 8.
+    #[getter]
+    fn id(&self) -> u8 {
+        self.id.get()
+    }
+
+    /// Its speed, turns per second, measured now. Set it to turn the motor.
+    #[getter]
+    fn velocity(&self, py: Python<'_>) -> PyResult<f32> {
+        match self.read(py)? {
+            Status::Velocity(rps) => Ok(rps),
+            Status::Position(_) => Err(wrong_mode(self.id, Mode::Position)),
+        }
+    }
+
+    #[setter]
+    fn set_velocity(&self, py: Python<'_>, rps: f32) -> PyResult<()> {
+        let target = Rps::new(rps).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let id = self.id;
+        self.bus.get().call(py, move |driver| {
+            driver.may_move(id, Target::Velocity(target))?;
+            driver.bus.set_velocity(id, target)
+        })
+    }
+
+    /// Its position, turns, measured now. Set it to move the motor there.
+    #[getter]
+    fn position(&self, py: Python<'_>) -> PyResult<f64> {
+        match self.read(py)? {
+            Status::Position(at) => {
+                Ok(f64::from(at.counts()) / f64::from(Position::COUNTS_PER_REVOLUTION))
+            }
+            Status::Velocity(_) => Err(wrong_mode(self.id, Mode::Velocity)),
+        }
+    }
+
+    #[setter]
+    fn set_position(&self, py: Python<'_>, turns: f64) -> PyResult<()> {
+        let counts = (turns * f64::from(Position::COUNTS_PER_REVOLUTION)).round();
+        let in_range = (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&counts);
+        let target = if in_range { Position::from_counts(counts as i32).ok() } else { None };
+        let target = target.ok_or_else(|| {
+            PyValueError::new_err(format!("position {turns} is outside -32768 to 32767 turns"))
+        })?;
+        let id = self.id;
+        self.bus.get().call(py, move |driver| {
+            driver.may_move(id, Target::Position(target))?;
+            driver.bus.set_position(id, target)
+        })
+    }
+
+    /// `velocity` or `position`; `None` if it has never answered.
+    #[getter]
+    fn mode(&self, py: Python<'_>) -> PyResult<Option<&'static str>> {
+        let id = self.id;
+        self.bus.get().worker.call(py, move |driver| driver.bus.role().mode(id).map(name))
+    }
+
+    /// `unknown`, `online`, `suspect` or `abnormal`.
+    #[getter]
+    fn health(&self, py: Python<'_>) -> PyResult<&'static str> {
+        let id = self.id;
+        let health = self.bus.get().worker.call(py, move |driver| driver.bus.role().health(id))?;
+        Ok(match health {
+            None => "unknown",
+            Some(Health::Online) => "online",
+            Some(Health::Suspect(_)) => "suspect",
+            Some(Health::Abnormal) => "abnormal",
+        })
+    }
+
+    /// How far its latest stop is: `not_asked`, `owed`, `confirmed`, `standing_still` or
+    /// `still_moving`.
+    #[getter]
+    fn stop_progress(&self, py: Python<'_>) -> PyResult<&'static str> {
+        let id = self.id;
+        let progress =
+            self.bus.get().worker.call(py, move |driver| driver.bus.role().stop_progress(id))?;
+        Ok(match progress {
+            StopProgress::NotAsked => "not_asked",
+            StopProgress::Owed => "owed",
+            StopProgress::Confirmed => "confirmed",
+            StopProgress::StandingStill => "standing_still",
+            StopProgress::StillMoving => "still_moving",
+        })
+    }
+
+    /// Stops it, and returns when its motor is seen to stand still.
+    fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        let id = self.id;
+        self.bus.get().call(py, move |driver| driver.bus.stop(id))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<axlewire.Node {} of {}>", self.id.get(), self.bus.get().port)
+    }
+}
+
+fn wrong_mode(node: NodeId, mode: Mode) -> PyErr {
+    crate::trouble::Refused::new_err(format!("node {node} is in {mode} mode"))
+}
