@@ -52,7 +52,7 @@ mod tables;
 mod teller;
 mod watch;
 
-use std::process::ExitCode;
+use std::{ffi::OsString, process::ExitCode};
 
 use clap::{
     Command as Description, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind,
@@ -97,10 +97,10 @@ enum Command {
     Sim(no_sim::Args),
 }
 
-/// Runs the tool with the arguments of this process.
+/// Runs the tool with these arguments, of which the first is its name.
 #[must_use]
-pub fn main() -> ExitCode {
-    let parsed = description().try_get_matches().and_then(|matches| {
+pub fn run_with(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let parsed = description().try_get_matches_from(args).and_then(|matches| {
         Cli::from_arg_matches(&matches).map_err(|error| error.with_cmd(&description()))
     });
     let result = match parsed {

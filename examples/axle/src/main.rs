@@ -1,7 +1,7 @@
 //! `axle`: the host tool for Ikeya MD and UCP lines.
 
-use std::process::ExitCode;
+use std::{env, process::ExitCode};
 
 fn main() -> ExitCode {
-    axle::main()
+    axle::run_with(env::args_os())
 }

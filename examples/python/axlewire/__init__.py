@@ -10,7 +10,10 @@ import atexit
 from axlewire._axlewire import (
     Bus,
     Capture,
+    Decoder,
     Error,
+    Frame,
+    Gap,
     NoAnswer,
     Node,
     NotOnline,
@@ -30,13 +33,18 @@ from axlewire._axlewire import (
     scan,
 )
 
+from axlewire import ikeya, sim, ucp
+
 # Motors that still turn are stopped, and seen to stand still.
 atexit.register(_leave_all)
 
 __all__ = [
     "Bus",
     "Capture",
+    "Decoder",
     "Error",
+    "Frame",
+    "Gap",
     "NoAnswer",
     "Node",
     "NotOnline",
@@ -51,6 +59,9 @@ __all__ = [
     "Table",
     "__version__",
     "crc16",
+    "ikeya",
     "read",
     "scan",
+    "sim",
+    "ucp",
 ]

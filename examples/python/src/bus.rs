@@ -11,7 +11,7 @@ use axlewire::{
     ikeya::{
         Mode, NodeId, Position, Rps,
         board::{Status, Target},
-        master::{Health, MasterConfig, MasterStatistics, NodeSet, StopProgress},
+        master::{Health, MasterConfig, MasterStatistics, NodeSet, Polling, StopProgress},
     },
     time::Duration,
 };
@@ -79,7 +79,8 @@ fn id(node: u8) -> PyResult<NodeId> {
 /// Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of the
 /// program, and when the object is collected. Between calls a thread of its own serves the line.
 /// Call something at least every `dead_man_s`, or `wait`: else the motors are stopped, because
-/// whoever is at the keyboard may have gone.
+/// whoever is at the keyboard may have gone. Each node is read, and told its set-point again, every
+/// `period_s`.
 #[pyclass(frozen, weakref, module = "axlewire")]
 pub(crate) struct Bus {
     worker: Arc<Worker<Driver>>,
@@ -89,7 +90,9 @@ pub(crate) struct Bus {
 #[pymethods]
 impl Bus {
     #[new]
-    #[pyo3(signature = (port, *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None))]
+    #[pyo3(signature = (
+        port, *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None, period_s=0.02
+    ))]
     fn new(
         py: Python<'_>,
         port: &Bound<'_, PyAny>,
@@ -97,12 +100,14 @@ impl Bus {
         baud: u32,
         dead_man_s: Option<f64>,
         reply_timeout_s: Option<f64>,
+        period_s: f64,
     ) -> PyResult<Self> {
         let path: std::path::PathBuf = port.extract()?;
         let port = path.to_string_lossy().into_owned();
         let mut config = MasterConfig::usb_adapter();
         config.baud = baud;
         config.dead_man = dead_man_s.map(span).transpose()?;
+        config.polling = Polling::Every(span(period_s)?);
         if let Some(seconds) = reply_timeout_s {
             config.reply_timeout = span(seconds)?;
         }
@@ -119,6 +124,7 @@ impl Bus {
     }
 
     /// Asks all ids, and returns the nodes that answer with their modes.
+    #[pyo3(signature = () -> "dict[int, str]")]
     fn discover<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = self.call(py, |driver| {
             driver.bus.discover().map(|nodes| nodes.into_iter().collect::<Vec<_>>())
@@ -149,7 +155,7 @@ impl Bus {
 
     /// Stops these nodes, or all that were moved, and returns when their motors are seen to stand
     /// still. Raises `StopsOwed` or `StillMoving` with the nodes whose motors may be moving.
-    #[pyo3(signature = (*nodes))]
+    #[pyo3(signature = (*nodes: "int") -> "None")]
     fn stop(&self, py: Python<'_>, nodes: Vec<u8>) -> PyResult<()> {
         let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
         let nodes: NodeSet = nodes?.into_iter().collect();

@@ -117,8 +117,9 @@ pub(crate) struct Capture {
     numbers: BTreeMap<String, Vec<Vec<u64>>>,
     schemas: Schemas,
     summary: Summary,
-    /// For plots: the bytes, or where they are.
-    name: String,
+    /// What it was read from: for its name, and for plots.
+    source: Py<PyAny>,
+    protocol: Option<String>,
 }
 
 /// Reads a capture as a whole.
@@ -131,7 +132,7 @@ pub(crate) fn read(
     units: Option<&str>,
 ) -> PyResult<Capture> {
     let units = Units::named(units)?;
-    let (name, source) = (source.repr()?.to_string(), Source::of(source)?);
+    let (given, source) = (source.clone().unbind(), Source::of(source)?);
     let signal = Mutex::new(None);
     let result = py.detach(|| {
         let capture = source.open(protocol.as_deref())?;
@@ -161,16 +162,16 @@ pub(crate) fn read(
             },
         )?;
         let tables = tables.into_iter().map(|(name, all)| (name, Arc::new(all))).collect();
-        Ok(Capture { tables, numbers, schemas, summary, name })
+        Ok((tables, numbers, schemas, summary))
     });
     if let Ok(Some(raised)) = signal.into_inner() {
         return Err(raised);
     }
-    let capture = result.map_err(raised)?;
-    if let Some(cut) = &capture.summary.cut {
+    let (tables, numbers, schemas, summary) = result.map_err(raised)?;
+    if let Some(cut) = &summary.cut {
         warn(py, cut)?;
     }
-    Ok(capture)
+    Ok(Capture { tables, numbers, schemas, summary, source: given, protocol })
 }
 
 #[pymethods]
@@ -224,34 +225,74 @@ impl Capture {
         dict.set_item("times_back", self.summary.times_back)?;
         dict.set_item("cut", self.summary.cut.clone())?;
         let messages = PyDict::new(py);
-        for (name, batches) in &self.tables {
-            messages.set_item(name, batches.iter().map(RecordBatch::num_rows).sum::<usize>())?;
+        for (name, rows) in self.counts() {
+            messages.set_item(name, rows)?;
         }
         dict.set_item("messages", messages)?;
         Ok(dict)
     }
 
-    fn __repr__(&self) -> String {
+    /// A picture, as `axle plot` draws it; a notebook shows it.
+    fn plot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let module = py.import("axlewire._picture")?;
+        module.getattr("plot")?.call1((&self.source, &self.protocol))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let account = &self.summary.account;
-        let tables: Vec<_> = self
-            .tables
-            .iter()
-            .map(|(name, all)| {
-                format!("{name}: {}", all.iter().map(RecordBatch::num_rows).sum::<usize>())
-            })
-            .collect();
-        format!(
+        let tables: Vec<_> =
+            self.counts().map(|(name, rows)| format!("{name}: {rows}")).collect();
+        Ok(format!(
             "<axlewire.Capture {}: {} bytes, {} frames, {} bytes skipped ({})>",
-            self.name,
+            self.name(py)?,
             account.received,
             account.frames,
             account.skipped(),
             tables.join(", ")
-        )
+        ))
+    }
+
+    /// For notebooks: the messages, and the bytes that belong to none.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let account = &self.summary.account;
+        let rows: String = self
+            .counts()
+            .map(|(name, rows)| format!("<tr><td>{}</td><td>{rows}</td></tr>", escaped(name)))
+            .collect();
+        let cut = self.summary.cut.as_deref().map(|cut| format!("<p>{}</p>", escaped(cut)));
+        Ok(format!(
+            "<p><b>{}</b>: {} bytes, {} frames, {} bytes in {} gaps</p>{}<table><tr><th>message</th>\
+             <th>rows</th></tr>{rows}</table>",
+            escaped(&self.name(py)?),
+            account.received,
+            account.frames,
+            account.skipped(),
+            account.gaps,
+            cut.unwrap_or_default(),
+        ))
     }
 }
 
+/// Text of HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
 impl Capture {
+    /// Paths as they are; of bytes, how many.
+    fn name(&self, py: Python<'_>) -> PyResult<String> {
+        let source = self.source.bind(py);
+        match source.cast::<PyBytes>() {
+            Ok(bytes) => Ok(format!("of {} bytes", bytes.as_bytes().len())),
+            Err(_) => Ok(source.repr()?.to_string()),
+        }
+    }
+
+    fn counts(&self) -> impl Iterator<Item = (&String, usize)> {
+        let rows = |all: &Arc<Vec<RecordBatch>>| all.iter().map(RecordBatch::num_rows).sum();
+        self.tables.iter().map(move |(name, all)| (name, rows(all)))
+    }
+
     fn full_name(&self, message: &str) -> PyResult<String> {
         self.schemas.full_name(message, |name| self.tables.contains_key(name)).ok_or_else(|| {
             PyKeyError::new_err(format!(

@@ -1,5 +1,6 @@
 //! The module behind the Python package `axlewire`.
 
+mod builders;
 mod bus;
 mod bytes;
 mod capture;
@@ -8,12 +9,26 @@ mod table;
 mod trouble;
 mod worker;
 
+use std::{ffi::OsString, process::ExitCode};
+
 use pyo3::prelude::*;
 
 /// CRC-16 of both protocols (ruling B1).
 #[pyfunction]
 fn crc16(data: &[u8]) -> u16 {
     axlewire::crc16::compute(data)
+}
+
+/// Runs the tool `axle` with these arguments, and returns its exit code.
+#[pyfunction]
+fn _tool(py: Python<'_>, args: Vec<OsString>) -> u8 {
+    let code = py.detach(|| axle::run_with(args));
+    // What `ExitCode` is cannot be asked.
+    match (code == ExitCode::SUCCESS, code == ExitCode::from(2)) {
+        (true, _) => 0,
+        (_, true) => 2,
+        _ => 1,
+    }
 }
 
 /// Stops whatever still moves, on all lines. Called at the end of the program.
@@ -25,27 +40,28 @@ fn _leave_all(py: Python<'_>) {
 }
 
 #[pymodule]
-fn _axlewire(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let py = module.py();
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_function(wrap_pyfunction!(crc16, module)?)?;
-    module.add_function(wrap_pyfunction!(_leave_all, module)?)?;
-    module.add_function(wrap_pyfunction!(capture::read, module)?)?;
-    module.add_function(wrap_pyfunction!(capture::scan, module)?)?;
-    module.add_class::<capture::Capture>()?;
-    module.add_class::<capture::Scan>()?;
-    module.add_class::<table::Table>()?;
-    module.add_class::<bus::Bus>()?;
-    module.add_class::<bus::Node>()?;
-    module.add_class::<rover::Rover>()?;
-    module.add_class::<rover::Reports>()?;
-    module.add_class::<rover::Report>()?;
-    module.add("Error", py.get_type::<trouble::Error>())?;
-    module.add("StopsOwed", py.get_type::<trouble::StopsOwed>())?;
-    module.add("StillMoving", py.get_type::<trouble::StillMoving>())?;
-    module.add("NotOnline", py.get_type::<trouble::NotOnline>())?;
-    module.add("Refused", py.get_type::<trouble::Refused>())?;
-    module.add("NoAnswer", py.get_type::<trouble::NoAnswer>())?;
-    module.add("PortLost", py.get_type::<trouble::PortLost>())?;
-    Ok(())
+mod _axlewire {
+    #[pymodule_export]
+    use crate::{
+        _leave_all, _tool,
+        builders::{
+            ikeya_position, ikeya_read, ikeya_velocity, ikeya_write_position,
+            ikeya_write_velocity, ucp_bias_request, ucp_biases, ucp_calibration_end,
+            ucp_calibration_end_ack, ucp_calibration_start, ucp_calibration_start_ack,
+            ucp_document_report, ucp_imu_bias, ucp_imu_bias_ack, ucp_mag_bias, ucp_mag_bias_ack,
+            ucp_motor_control, ucp_network_state, ucp_ota_ack, ucp_ota_request, ucp_ping, ucp_pong,
+            ucp_report, ucp_unknown,
+        },
+        bus::{Bus, Node},
+        bytes::{Decoder, Framed, Gap},
+        capture::{Capture, Scan, read, scan},
+        crc16,
+        rover::{Report, Reports, Rover},
+        table::Table,
+        trouble::{Error, NoAnswer, NotOnline, PortLost, Refused, StillMoving, StopsOwed},
+    };
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "Python's name")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

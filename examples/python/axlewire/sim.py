@@ -1,0 +1,82 @@
+"""Simulated motors and a simulated rover, for trying things without hardware.
+
+    with axlewire.sim.bus({1: "velocity"}) as port, axlewire.Bus(port) as bus:
+        bus.discover()
+        bus[1].velocity = 2.0
+
+Each is a process with a pseudo-terminal, which is why there is none on Windows. Options are those
+of `axle sim`: `python -m axlewire sim ikeya --help`.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from types import TracebackType
+
+START_WITHIN_S = 10.0
+
+
+class Simulator(os.PathLike[str]):
+    """A simulator; its path is that of the port, and `log` what it tells."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="axle-")
+        self.path = os.path.join(self._folder.name, "port")
+        self._log = os.path.join(self._folder.name, "log")
+        command = [sys.executable, "-m", "axlewire", "sim", *arguments, "--link", self.path]
+        with open(self._log, "wb") as log:
+            self._process = subprocess.Popen(command, stdout=log, stderr=log)
+        end = time.monotonic() + START_WITHIN_S
+        while not os.path.exists(self.path):
+            if self._process.poll() is not None or time.monotonic() > end:
+                told = self.log
+                self.close()
+                raise RuntimeError(f"the simulator did not start: {told}")
+            time.sleep(0.01)
+
+    @property
+    def log(self) -> str:
+        """What it has told so far, such as which motor turns."""
+        with open(self._log, encoding="utf-8") as log:
+            return log.read()
+
+    def close(self) -> None:
+        """Ends it, as if the cable were pulled."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def __fspath__(self) -> str:
+        return self.path
+
+    def __enter__(self) -> Simulator:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<axlewire.sim.Simulator on {self.path}>"
+
+
+def bus(nodes: Mapping[int, str] | None = None, *options: str) -> Simulator:
+    """A bus of motors; `nodes` gives the mode of each, `velocity` or `position`."""
+    chosen = {1: "velocity"} if nodes is None else nodes
+    flags = [flag for node, mode in chosen.items() for flag in ("--node", f"{node}:{mode}")]
+    return Simulator("ikeya", *flags, *options)
+
+
+def rover(*options: str) -> Simulator:
+    """A rover."""
+    return Simulator("ucp", *options)
