@@ -103,7 +103,7 @@ fn telemetry(fields: Option<&Bound<'_, PyDict>>) -> PyResult<Telemetry> {
 
 /// Robot to host: what it measures, with the fields of `capture["report"]`.
 #[pyfunction]
-#[pyo3(signature = (*, version = 38, index = 0, **fields))]
+#[pyo3(signature = (*, version = 38, index = 0, **fields: "int | Sequence[int]"))]
 pub(crate) fn ucp_report<'py>(
     py: Python<'py>,
     version: u16,
@@ -115,7 +115,7 @@ pub(crate) fn ucp_report<'py>(
 
 /// The same in the layout of the document (ruling U5).
 #[pyfunction]
-#[pyo3(signature = (*, index = 0, **fields))]
+#[pyo3(signature = (*, index = 0, **fields: "int | Sequence[int]"))]
 pub(crate) fn ucp_document_report<'py>(
     py: Python<'py>,
     index: u8,

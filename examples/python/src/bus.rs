@@ -91,7 +91,7 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (
-        port, *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None, period_s=0.02
+        port: "str | os.PathLike[str]", *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None, period_s=0.02
     ))]
     fn new(
         py: Python<'_>,

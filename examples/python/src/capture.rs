@@ -124,7 +124,7 @@ pub(crate) struct Capture {
 
 /// Reads a capture as a whole.
 #[pyfunction]
-#[pyo3(signature = (source, *, protocol=None, units=None))]
+#[pyo3(signature = (source: "Source", *, protocol=None, units=None))]
 pub(crate) fn read(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,
@@ -233,6 +233,7 @@ impl Capture {
     }
 
     /// A picture, as `axle plot` draws it; a notebook shows it.
+    #[pyo3(signature = () -> "Picture")]
     fn plot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let module = py.import("axlewire._picture")?;
         module.getattr("plot")?.call1((&self.source, &self.protocol))
@@ -319,7 +320,7 @@ struct Reading {
 
 /// Begins to read a capture.
 #[pyfunction]
-#[pyo3(signature = (source, *, protocol=None, message=None, units=None))]
+#[pyo3(signature = (source: "Source", *, protocol=None, message=None, units=None))]
 pub(crate) fn scan(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,

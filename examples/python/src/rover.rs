@@ -110,7 +110,7 @@ pub(crate) struct Rover {
 #[pymethods]
 impl Rover {
     #[new]
-    #[pyo3(signature = (port, *, baud=115_200, dead_man_s=0.5, low_ids_only=false))]
+    #[pyo3(signature = (port: "str | os.PathLike[str]", *, baud=115_200, dead_man_s=0.5, low_ids_only=false))]
     fn new(
         py: Python<'_>,
         port: &Bound<'_, PyAny>,
@@ -370,6 +370,7 @@ impl Report {
     }
 
     /// All fields with their values.
+    #[pyo3(signature = () -> "dict[str, int | list[int]]")]
     fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         let value = serde_json::to_value(self.0.telemetry)

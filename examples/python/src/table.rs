@@ -302,6 +302,7 @@ impl Table {
     }
 
     /// All columns as lists.
+    #[pyo3(signature = () -> "dict[str, list[Any]]")]
     fn to_pydict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         for name in self.column_names() {
