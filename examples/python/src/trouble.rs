@@ -47,6 +47,12 @@ enum Kind {
 }
 
 impl Trouble {
+    /// The thread has ended by a bug: what it has moved may be moving.
+    pub(crate) fn bug() -> Self {
+        let text = "the package has a bug and gave up: what was moved may be moving".to_owned();
+        Self { kind: Kind::StillMoving, text, nodes: Vec::new() }
+    }
+
     /// As an exception with the text and the nodes.
     pub(crate) fn raised(self, py: Python<'_>) -> PyErr {
         let text = self.text;

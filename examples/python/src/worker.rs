@@ -110,7 +110,7 @@ impl<D: Driven> Worker<D> {
         match &*thread {
             None => Some(Ok(())),
             Some(running) if !running.is_finished() => None,
-            Some(_) => thread.take().map(|it| it.join().unwrap_or(Ok(()))),
+            Some(_) => thread.take().map(ended),
         }
     }
 }
@@ -119,8 +119,12 @@ impl<D: Driven> Leave for Worker<D> {
     fn leave(&self) -> Result<(), Trouble> {
         self.dismiss();
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
-        thread.map_or(Ok(()), |it| it.join().unwrap_or(Ok(())))
+        thread.map_or(Ok(()), ended)
     }
+}
+
+fn ended(thread: JoinHandle<Result<(), Trouble>>) -> Result<(), Trouble> {
+    thread.join().unwrap_or_else(|_| Err(Trouble::bug()))
 }
 
 fn run<D: Driven>(mut driver: D, jobs: &Receiver<Job<D>>) -> Result<(), Trouble> {
