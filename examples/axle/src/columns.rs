@@ -35,7 +35,10 @@ pub enum Error {
 
 impl From<Failure> for Error {
     fn from(failure: Failure) -> Self {
-        let line = failure.to_string();
+        let line = match &failure {
+            Failure::Read { path: None, error } => format!("cannot read the capture: {error}"),
+            _ => failure.to_string(),
+        };
         match failure {
             Failure::Open { .. } | Failure::Read { .. } => Self::Io(line),
             Failure::Usage(_) => Self::Argument(line),
@@ -75,7 +78,7 @@ pub struct Capture {
 
 impl Capture {
     /// Opens files, and folders of them, which follow each other in the order of time. `protocol`
-    /// names that of raw bytes: `ucp`, `ikeya` or `ikeya3`; without it, it is found out.
+    /// names that of raw bytes: `ucp`, `ikeya` or `ikeya-3`; without it, it is found out.
     ///
     /// # Errors
     ///
@@ -145,7 +148,7 @@ fn named(protocol: Option<&str>) -> Result<Option<Protocol>, Error> {
     let Some(name) = protocol else { return Ok(None) };
     let known = all.into_iter().find(|protocol| protocol.name() == name);
     known.map(Some).ok_or_else(|| {
-        Error::Argument(format!("protocol {name:?} is none of 'ucp', 'ikeya', 'ikeya3'"))
+        Error::Argument(format!("protocol {name:?} is none of 'ucp', 'ikeya', 'ikeya-3'"))
     })
 }
 

@@ -76,11 +76,11 @@ fn id(node: u8) -> PyResult<NodeId> {
 
 /// A motor bus on a serial port (Ikeya MD, boards with one motor).
 ///
-/// Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of the
-/// program, and when the object is collected. Between calls a thread of its own serves the line.
-/// Call something at least every `dead_man_s`, or `wait`: else the motors are stopped, because
-/// whoever is at the keyboard may have gone. Each node is read, and told its set-point again, every
-/// `period_s`.
+/// Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of
+/// the program, and when the object is collected. Between calls a thread of its own serves the
+/// line. Call something at least every `dead_man_s`, or `wait`: else the motors are stopped,
+/// because whoever is at the keyboard may have gone. Each node is read, and told its set-point
+/// again, every `period_s`.
 #[pyclass(frozen, weakref, module = "axlewire")]
 pub(crate) struct Bus {
     worker: Arc<Worker<Driver>>,
@@ -116,7 +116,8 @@ impl Bus {
             config.nodes = nodes?.into_iter().collect();
         }
         let opened = py.detach(|| drive::Bus::open_with(&port, config));
-        let bus = opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
+        let bus =
+            opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
         let worker = Arc::new(Worker::new(Driver { bus, moved: NodeSet::default() }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);

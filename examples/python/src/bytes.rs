@@ -60,7 +60,7 @@ impl Framed {
     #[expect(non_upper_case_globals, reason = "Python's name")]
     const __match_args__: (&'static str, &'static str) = ("message", "raw");
 
-    /// `ucp`, `ikeya` or `ikeya3`.
+    /// `ucp`, `ikeya` or `ikeya-3`.
     #[getter]
     const fn protocol(&self) -> &'static str {
         self.protocol
@@ -103,7 +103,8 @@ impl Framed {
 
     fn __repr__(&self) -> String {
         let fields = self.fields.as_object().into_iter().flatten();
-        let told = fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
+        let told =
+            fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
         let told: Vec<_> = told.map(|(name, value)| format!("{name}={value}")).collect();
         format!("<axlewire.Frame {}.{} {}>", self.protocol, self.message(), told.join(" "))
     }
@@ -213,7 +214,7 @@ pub(crate) struct Decoder {
 
 #[pymethods]
 impl Decoder {
-    /// For `ucp`, `ikeya` or `ikeya3`; packets of both directions.
+    /// For `ucp`, `ikeya` or `ikeya-3`; packets of both directions.
     #[new]
     fn new(protocol: &str) -> PyResult<Self> {
         fn of<F: Framing>(protocol: &'static str) -> Of<F> {
@@ -222,9 +223,9 @@ impl Decoder {
         let (protocol, decoder): (_, Box<dyn Decodes + Sync>) = match protocol {
             "ucp" => ("ucp", Box::new(of::<ucp::Ucp>("ucp"))),
             "ikeya" => ("ikeya", Box::new(of::<ikeya::BothDirections>("ikeya"))),
-            "ikeya3" => ("ikeya3", Box::new(of::<three::BothDirections>("ikeya3"))),
+            "ikeya-3" => ("ikeya-3", Box::new(of::<three::BothDirections>("ikeya-3"))),
             other => {
-                let line = format!("protocol {other:?} is none of 'ucp', 'ikeya', 'ikeya3'");
+                let line = format!("protocol {other:?} is none of 'ucp', 'ikeya', 'ikeya-3'");
                 return Err(PyValueError::new_err(line));
             }
         };
@@ -239,8 +240,8 @@ impl Decoder {
         Ok(events)
     }
 
-    /// The line is quiet, or the stream has ended: what is pending is no frame any more. Returns what
-    /// is decided now.
+    /// The line is quiet, or the stream has ended: what is pending is no frame any more. Returns
+    /// what is decided now.
     #[pyo3(signature = () -> "list[Frame | Gap]")]
     fn idle(&mut self, py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
         let mut events = Vec::new();

@@ -6,7 +6,7 @@ use std::{
     io::{self, Cursor, Read},
     path::PathBuf,
     sync::{
-        Arc, Mutex,
+        Arc, Mutex, PoisonError,
         mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel},
     },
     thread::{self, JoinHandle},
@@ -17,7 +17,7 @@ use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{ArrowError, SchemaRef};
 use axle::columns::{self, Batch, Error, Summary};
 use pyo3::{
-    exceptions::{PyKeyError, PyOSError, PyTypeError, PyUserWarning, PyValueError},
+    exceptions::{PyOSError, PyTypeError, PyUserWarning, PyValueError},
     prelude::*,
     types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyMemoryView, PyString},
 };
@@ -217,13 +217,7 @@ impl Capture {
     /// The account of the bytes, as a dictionary.
     #[getter]
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (dict, account) = (PyDict::new(py), &self.summary.account);
-        dict.set_item("received", account.received)?;
-        dict.set_item("frames", account.frames)?;
-        dict.set_item("framed", account.framed)?;
-        dict.set_item("skipped", account.skipped())?;
-        dict.set_item("times_back", self.summary.times_back)?;
-        dict.set_item("cut", self.summary.cut.clone())?;
+        let dict = account_of(py, &self.summary)?;
         let messages = PyDict::new(py);
         for (name, rows) in self.counts() {
             messages.set_item(name, rows)?;
@@ -241,8 +235,7 @@ impl Capture {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let account = &self.summary.account;
-        let tables: Vec<_> =
-            self.counts().map(|(name, rows)| format!("{name}: {rows}")).collect();
+        let tables: Vec<_> = self.counts().map(|(name, rows)| format!("{name}: {rows}")).collect();
         Ok(format!(
             "<axlewire.Capture {}: {} bytes, {} frames, {} bytes skipped ({})>",
             self.name(py)?,
@@ -295,12 +288,8 @@ impl Capture {
     }
 
     fn full_name(&self, message: &str) -> PyResult<String> {
-        self.schemas.full_name(message, |name| self.tables.contains_key(name)).ok_or_else(|| {
-            PyKeyError::new_err(format!(
-                "no message {message:?}; there are {}",
-                self.schemas.names()
-            ))
-        })
+        let found = self.schemas.full_name(message, |name| self.tables.contains_key(name));
+        found.ok_or_else(|| self.schemas.no_message(message))
     }
 }
 
@@ -310,6 +299,8 @@ pub(crate) struct Scan {
     reading: Mutex<Reading>,
     schemas: Schemas,
     message: Option<String>,
+    /// Once all was read.
+    summary: Mutex<Option<Summary>>,
 }
 
 /// What the other thread gives; `None` once it has ended.
@@ -331,6 +322,7 @@ pub(crate) fn scan(
     let (units, source) = (Units::named(units)?, Source::of(source)?);
     let (to, batches) = sync_channel(AHEAD);
     let (say, said) = sync_channel(1);
+    let named = protocol.clone();
     let reader = thread::spawn(move || run(source, protocol.as_deref(), &say, &to));
     let mut reading = Reading { batches: Some(batches), reader: Some(reader) };
     let said = Mutex::new(said);
@@ -340,13 +332,8 @@ pub(crate) fn scan(
         return Err(raised(Error::Stopped));
     };
     let schemas = Schemas::new(&empty, units);
-    let message = match message {
-        Some(message) => Some(schemas.full_name(message, |_| false).ok_or_else(|| {
-            PyKeyError::new_err(format!("no message {message:?}; there are {}", schemas.names()))
-        })?),
-        None => None,
-    };
-    Ok(Scan { reading: Mutex::new(reading), schemas, message })
+    let message = message.map(|message| schemas.only(message, named.as_deref())).transpose()?;
+    Ok(Scan { reading: Mutex::new(reading), schemas, message, summary: Mutex::new(None) })
 }
 
 fn run(
@@ -388,6 +375,14 @@ impl Reading {
 }
 
 impl Scan {
+    /// All was read: what is missing is told, once.
+    fn end(&self, py: Python<'_>, summary: Option<Summary>) -> PyResult<()> {
+        let Some(summary) = summary else { return Ok(()) };
+        let cut = summary.cut.clone();
+        *self.summary.lock().unwrap_or_else(PoisonError::into_inner) = Some(summary);
+        cut.map_or(Ok(()), |cut| warn(py, &cut))
+    }
+
     /// The next batch of the message, or of any; `None` at the end.
     fn next_batch(&self, within: Duration) -> Result<Next, Error> {
         let mut reading = self.reading.lock().map_err(|_| Error::Stopped)?;
@@ -416,9 +411,7 @@ impl Scan {
                 }
                 Next::Waits => py.check_signals()?,
                 Next::End(summary) => {
-                    if let Some(cut) = summary.and_then(|summary| summary.cut) {
-                        warn(py, &cut)?;
-                    }
+                    self.end(py, summary)?;
                     return Ok(None);
                 }
             }
@@ -441,6 +434,13 @@ impl Scan {
         stream(slf.py(), Box::new(batches))
     }
 
+    /// The account of the bytes, as that of a capture; `None` before the end.
+    #[getter]
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
+        summary.as_ref().map(|summary| account_of(py, summary)).transpose()
+    }
+
     fn __repr__(&self) -> String {
         format!("<axlewire.Scan of {}>", self.message.as_deref().unwrap_or("all messages"))
     }
@@ -461,7 +461,11 @@ impl Iterator for Batches {
             match scan.next_batch(SIGNALS_EVERY) {
                 Ok(Next::Batch(batch)) => return Some(Ok(scan.schemas.batch(batch))),
                 Ok(Next::Waits) => {}
-                Ok(Next::End(_)) => return None,
+                Ok(Next::End(summary)) => {
+                    let ended = Python::try_attach(|py| scan.end(py, summary));
+                    let failed = ended.and_then(Result::err)?;
+                    return Some(Err(ArrowError::ExternalError(failed.to_string().into())));
+                }
                 Err(error) => {
                     let line = raised_text(&error);
                     return Some(Err(ArrowError::ExternalError(line.into())));
@@ -475,6 +479,19 @@ impl RecordBatchReader for Batches {
     fn schema(&self) -> SchemaRef {
         Arc::clone(&self.schema)
     }
+}
+
+/// What was found, as a dictionary.
+fn account_of<'py>(py: Python<'py>, summary: &Summary) -> PyResult<Bound<'py, PyDict>> {
+    let (dict, account) = (PyDict::new(py), &summary.account);
+    dict.set_item("received", account.received)?;
+    dict.set_item("frames", account.frames)?;
+    dict.set_item("framed", account.framed)?;
+    dict.set_item("gaps", account.gaps)?;
+    dict.set_item("skipped", account.skipped())?;
+    dict.set_item("times_back", summary.times_back)?;
+    dict.set_item("cut", summary.cut.clone())?;
+    Ok(dict)
 }
 
 /// What is missing of a capture, as a warning.

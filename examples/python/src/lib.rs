@@ -45,12 +45,11 @@ mod _axlewire {
     use crate::{
         _leave_all, _tool,
         builders::{
-            ikeya_position, ikeya_read, ikeya_velocity, ikeya_write_position,
-            ikeya_write_velocity, ucp_bias_request, ucp_biases, ucp_calibration_end,
-            ucp_calibration_end_ack, ucp_calibration_start, ucp_calibration_start_ack,
-            ucp_document_report, ucp_imu_bias, ucp_imu_bias_ack, ucp_mag_bias, ucp_mag_bias_ack,
-            ucp_motor_control, ucp_network_state, ucp_ota_ack, ucp_ota_request, ucp_ping, ucp_pong,
-            ucp_report, ucp_unknown,
+            ikeya_position, ikeya_read, ikeya_velocity, ikeya_write_position, ikeya_write_velocity,
+            ucp_bias_request, ucp_biases, ucp_calibration_end, ucp_calibration_end_ack,
+            ucp_calibration_start, ucp_calibration_start_ack, ucp_document_report, ucp_imu_bias,
+            ucp_imu_bias_ack, ucp_mag_bias, ucp_mag_bias_ack, ucp_motor_control, ucp_network_state,
+            ucp_ota_ack, ucp_ota_request, ucp_ping, ucp_pong, ucp_report, ucp_unknown,
         },
         bus::{Bus, Node},
         bytes::{Decoder, Framed, Gap},

@@ -98,9 +98,9 @@ impl Driver {
 
 /// A rover on a serial port (UCP).
 ///
-/// It is stopped, and seen to stand still, when the `with` block is left, at the end of the program,
-/// and when the object is collected. A command without `seconds` ends by itself after half a second
-/// if no other follows: whoever is at the keyboard may have gone.
+/// It is stopped, and seen to stand still, when the `with` block is left, at the end of the
+/// program, and when the object is collected. A command without `seconds` ends by itself after half
+/// a second if no other follows: whoever is at the keyboard may have gone.
 #[pyclass(frozen, weakref, module = "axlewire")]
 pub(crate) struct Rover {
     worker: Arc<Worker<Driver>>,
@@ -126,16 +126,15 @@ impl Rover {
         let opened = py.detach(|| drive::Rover::open_with(&port, config));
         let rover =
             opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
-        let worker =
-            Arc::new(Worker::new(Driver { rover, has_moved: false, queues: Vec::new() }));
+        let worker = Arc::new(Worker::new(Driver { rover, has_moved: false, queues: Vec::new() }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);
         Ok(Self { worker, port })
     }
 
-    /// Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that is
-    /// turned to the right. With `seconds` it then stops, and returns when the rover is seen to
-    /// stand still; else it returns at once.
+    /// Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that
+    /// is turned to the right. With `seconds` it then stops, and returns when the rover is seen
+    /// to stand still; else it returns at once.
     #[pyo3(signature = (speed=0, angular=0, *, seconds=None))]
     fn drive(
         &self,
@@ -244,8 +243,7 @@ impl Rover {
         py: Python<'_>,
         job: impl FnOnce(&mut Driver) -> Result<T, Failed> + Send + 'static,
     ) -> PyResult<T> {
-        let result =
-            self.worker.call(py, move |driver| job(driver).map_err(Trouble::from))?;
+        let result = self.worker.call(py, move |driver| job(driver).map_err(Trouble::from))?;
         result.map_err(|trouble| trouble.raised(py))
     }
 
@@ -392,4 +390,3 @@ impl Report {
         Ok(format!("<axlewire.Report {} of {}>", self.0.index, self.fields(py)?))
     }
 }
-

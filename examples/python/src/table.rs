@@ -102,7 +102,29 @@ impl Schemas {
         known.first().map(|name| (*name).clone())
     }
 
-    pub(crate) fn names(&self) -> String {
+    /// The same of a stream, whose rows are not known yet: there must be one, of this protocol if
+    /// it is named.
+    pub(crate) fn only(&self, message: &str, protocol: Option<&str>) -> PyResult<String> {
+        let is_it = |name: &&str| {
+            let (of, rest) = name.split_once('.').unwrap_or(("", name));
+            *name == message || (rest == message && protocol.is_none_or(|it| it == of))
+        };
+        let all = self.all.iter().map(|(name, _)| name.as_str());
+        match *all.filter(is_it).collect::<Vec<_>>() {
+            [only] => Ok(only.to_owned()),
+            [] => Err(self.no_message(message)),
+            ref several => {
+                let several = several.join(" or ");
+                Err(PyValueError::new_err(format!("{message:?} may be {several}: say which")))
+            }
+        }
+    }
+
+    pub(crate) fn no_message(&self, message: &str) -> PyErr {
+        PyKeyError::new_err(format!("no message {message:?}; there are {}", self.names()))
+    }
+
+    fn names(&self) -> String {
         let names: Vec<_> = self.all.iter().map(|(name, _)| name.as_str()).collect();
         names.join(", ")
     }

@@ -59,7 +59,8 @@ pub(crate) fn leave_all() -> Vec<Trouble> {
     let open = std::mem::take(&mut *OPEN.lock().unwrap_or_else(PoisonError::into_inner));
     let lines: Vec<_> = open.iter().filter_map(Weak::upgrade).collect();
     // Side by side: one line that fails does not keep the others waiting.
-    let leaving: Vec<_> = lines.into_iter().map(|line| thread::spawn(move || line.leave())).collect();
+    let leaving: Vec<_> =
+        lines.into_iter().map(|line| thread::spawn(move || line.leave())).collect();
     leaving.into_iter().filter_map(|it| it.join().ok()?.err()).collect()
 }
 
