@@ -161,9 +161,11 @@ impl<R: FnMut(Batch) -> Result<(), Failure>> Sink for Taker<R> {
 }
 
 fn take(table: &mut Table) -> Batch {
+    // The next batch is often as long.
+    let numbers = Vec::with_capacity(table.numbers.len());
     Batch {
         table: table.name.clone(),
-        numbers: std::mem::take(&mut table.numbers),
+        numbers: std::mem::replace(&mut table.numbers, numbers),
         columns: table.columns.iter_mut().map(Column::take).collect(),
     }
 }

@@ -208,22 +208,28 @@ fn column(column: Column) -> ArrayRef {
             Arc::new(<$array>::new(spread(present, &$values, |it| it as $number).into(), nulls))
         };
     }
+    // Without a copy, if no row is without a value.
+    macro_rules! exact {
+        ($array:ty, $values:expr) => {
+            match present {
+                None => Arc::new(<$array>::from($values)),
+                Some(_) => Arc::new(<$array>::new(spread(present, &$values, |it| it).into(), nulls)),
+            }
+        };
+    }
     match (values, kind) {
-        (Values::Small(values), Kind::U8) => small!(UInt8Array, u8, values),
+        (Values::U8(values), _) => exact!(UInt8Array, values),
+        (Values::U16(values), _) => exact!(UInt16Array, values),
+        (Values::I16(values), _) => exact!(Int16Array, values),
         (Values::Small(values), Kind::I8) => small!(Int8Array, i8, values),
-        (Values::Small(values), Kind::U16) => small!(UInt16Array, u16, values),
-        (Values::Small(values), Kind::I16) => small!(Int16Array, i16, values),
         (Values::Small(values), Kind::U32) => small!(UInt32Array, u32, values),
-        (Values::Small(values), _) if present.is_none() => Arc::new(Int32Array::from(values)),
-        (Values::Small(values), _) => small!(Int32Array, i32, values),
+        (Values::Small(values), _) => exact!(Int32Array, values),
         (Values::Large(values), Kind::Time) => {
             let values = spread(present, &values, |it| it as i64);
             Arc::new(TimestampMicrosecondArray::new(values.into(), nulls).with_timezone("UTC"))
         }
-        (Values::Large(values), _) if present.is_none() => Arc::new(UInt64Array::from(values)),
-        (Values::Large(values), _) => small!(UInt64Array, u64, values),
-        (Values::Float(values), _) if present.is_none() => Arc::new(Float32Array::from(values)),
-        (Values::Float(values), _) => small!(Float32Array, f32, values),
+        (Values::Large(values), _) => exact!(UInt64Array, values),
+        (Values::Float(values), _) => exact!(Float32Array, values),
         (Values::Name(values), _) => {
             let keys = Int8Array::new(spread(present, &values, |it| it as i8).into(), nulls);
             let names: ArrayRef = Arc::new(StringArray::from(names));
@@ -257,6 +263,9 @@ fn si_column(column: &Column) -> Option<ArrayRef> {
     let (_, factor) = si(column.unit)?;
     let present = column.present.as_deref();
     let values = match &column.values {
+        Values::U8(values) => spread(present, values, |it| f64::from(it) * factor),
+        Values::U16(values) => spread(present, values, |it| f64::from(it) * factor),
+        Values::I16(values) => spread(present, values, |it| f64::from(it) * factor),
         Values::Small(values) if column.kind == Kind::U32 => {
             spread(present, values, |it| f64::from(it as u32) * factor)
         }

@@ -160,6 +160,9 @@ fn write(
 ) -> Result<(), ParquetError> {
     let range = piece.values.clone();
     match &column.values {
+        Values::U8(values) => put_wide(to, part(values, range), piece),
+        Values::U16(values) => put_wide(to, part(values, range), piece),
+        Values::I16(values) => put_wide(to, part(values, range), piece),
         Values::Small(values) => put::<Int32Type>(to, part(values, range), piece),
         Values::Float(values) => put::<FloatType>(to, part(values, range), piece),
         Values::Large(values) => {
@@ -198,6 +201,16 @@ fn put<T: DataType>(
 ) -> Result<(), ParquetError> {
     to.typed::<T>().write_batch(values, piece.levels.as_deref(), None)?;
     Ok(())
+}
+
+/// Integers for which the format has no type of their width.
+fn put_wide<T: Copy + Into<i32>>(
+    to: &mut SerializedColumnWriter<'_>,
+    values: &[T],
+    piece: &Piece,
+) -> Result<(), ParquetError> {
+    let values: Vec<i32> = values.iter().map(|value| (*value).into()).collect();
+    put::<Int32Type>(to, &values, piece)
 }
 
 /// A column of bytes, encoded as pages. The writer of the crate takes a reference-counted buffer

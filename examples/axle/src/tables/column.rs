@@ -24,7 +24,7 @@ impl ser::Error for Unfit {
 }
 
 /// A column: its values, where there are any.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct Column {
     /// That of the field, with the number or the name of a part of it.
     pub name: String,
@@ -45,9 +45,13 @@ pub struct Column {
 }
 
 /// The values of the rows that have one.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
+#[expect(missing_docs, reason = "integers are named after their types")]
 pub enum Values {
-    /// Integers of up to 32 bits; a `u32` as the `i32` of the same bits.
+    U8(Vec<u8>),
+    U16(Vec<u16>),
+    I16(Vec<i16>),
+    /// Other integers of up to 32 bits; a `u32` as the `i32` of the same bits.
     Small(Vec<i32>),
     /// `u64` and times.
     Large(Vec<u64>),
@@ -57,6 +61,22 @@ pub enum Values {
     Name(Vec<u8>),
     /// The end of each run of bytes, and all runs in one.
     Bytes(Vec<u32>, Vec<u8>),
+}
+
+/// Does the same with the vector of whatever values there are: for runs of bytes, that of their
+/// ends.
+macro_rules! each {
+    ($of:expr, $values:ident => $done:expr) => {
+        match $of {
+            Values::U8($values) | Values::Name($values) => $done,
+            Values::U16($values) => $done,
+            Values::I16($values) => $done,
+            Values::Small($values) => $done,
+            Values::Large($values) => $done,
+            Values::Float($values) => $done,
+            Values::Bytes($values, _) => $done,
+        }
+    };
 }
 
 /// One value.
@@ -75,9 +95,10 @@ pub(crate) enum Cell<'a> {
 impl Column {
     pub(super) fn new(name: String, field: &Field, names: Vec<&'static str>) -> Self {
         let values = match field.kind {
-            Kind::U8 | Kind::I8 | Kind::U16 | Kind::I16 | Kind::U32 | Kind::I32 => {
-                Values::Small(Vec::new())
-            }
+            Kind::U8 => Values::U8(Vec::new()),
+            Kind::U16 => Values::U16(Vec::new()),
+            Kind::I16 => Values::I16(Vec::new()),
+            Kind::I8 | Kind::U32 | Kind::I32 => Values::Small(Vec::new()),
             Kind::U64 | Kind::Time => Values::Large(Vec::new()),
             Kind::F32 => Values::Float(Vec::new()),
             Kind::Name(_) => Values::Name(Vec::new()),
@@ -121,6 +142,9 @@ impl Column {
     /// One of the values.
     fn cell(&self, at: usize) -> Option<Cell<'_>> {
         Some(match (&self.values, &self.kind) {
+            (Values::U8(values), _) => Cell::Integer((*values.get(at)?).into()),
+            (Values::U16(values), _) => Cell::Integer((*values.get(at)?).into()),
+            (Values::I16(values), _) => Cell::Integer((*values.get(at)?).into()),
             (Values::Small(values), Kind::U32) => Cell::Integer((*values.get(at)? as u32).into()),
             (Values::Small(values), _) => Cell::Integer((*values.get(at)?).into()),
             (Values::Large(values), Kind::Time) => Cell::Time(*values.get(at)?),
@@ -136,15 +160,9 @@ impl Column {
 
     pub(super) fn clear(&mut self) {
         self.present.as_mut().map(Vec::clear).unwrap_or_default();
-        match &mut self.values {
-            Values::Small(values) => values.clear(),
-            Values::Large(values) => values.clear(),
-            Values::Float(values) => values.clear(),
-            Values::Name(values) => values.clear(),
-            Values::Bytes(ends, bytes) => {
-                ends.clear();
-                bytes.clear();
-            }
+        each!(&mut self.values, values => values.clear());
+        if let Values::Bytes(_, bytes) = &mut self.values {
+            bytes.clear();
         }
     }
 
@@ -155,19 +173,12 @@ impl Column {
             Some(_) => false,
             None => self.values.len() > rows,
         };
-        match &mut self.values {
-            Values::Small(values) if has_value => drop(values.pop()),
-            Values::Large(values) if has_value => drop(values.pop()),
-            Values::Float(values) if has_value => drop(values.pop()),
-            Values::Name(values) if has_value => drop(values.pop()),
-            Values::Bytes(ends, bytes) => {
-                if has_value {
-                    ends.pop();
-                }
-                // Half of one, too.
-                bytes.truncate(ends.last().copied().unwrap_or_default() as usize);
-            }
-            _ => {}
+        if has_value {
+            each!(&mut self.values, values => drop(values.pop()));
+        }
+        if let Values::Bytes(ends, bytes) = &mut self.values {
+            // Half of one, too.
+            bytes.truncate(ends.last().copied().unwrap_or_default() as usize);
         }
     }
 
@@ -187,7 +198,10 @@ impl Column {
     #[inline]
     pub(super) fn integer(&mut self, value: i64) -> Result<(), Unfit> {
         match &mut self.values {
-            // All types of this width take their values only: the table of fields says so.
+            // All of these take values of their types only: the table of fields says so.
+            Values::U8(values) => values.push(value as u8),
+            Values::U16(values) => values.push(value as u16),
+            Values::I16(values) => values.push(value as i16),
             Values::Small(values) => values.push(value as i32),
             Values::Large(values) => values.push(value as u64),
             _ => return Err(Unfit),
@@ -199,6 +213,7 @@ impl Column {
     #[inline]
     pub(super) fn unsigned(&mut self, value: u64) -> Result<(), Unfit> {
         match &mut self.values {
+            Values::U8(values) => values.push(u8::try_from(value).map_err(|_| Unfit)?),
             Values::Small(values) => values.push(u32::try_from(value).map_err(|_| Unfit)? as i32),
             Values::Large(values) => values.push(value),
             _ => return Err(Unfit),
@@ -253,26 +268,25 @@ impl Column {
 }
 
 impl Values {
-    /// Moves them out.
+    /// Moves them out. There is room for as many again: the next batch is often as long.
     fn take(&mut self) -> Self {
         let empty = match self {
-            Self::Small(_) => Self::Small(Vec::new()),
-            Self::Large(_) => Self::Large(Vec::new()),
-            Self::Float(_) => Self::Float(Vec::new()),
-            Self::Name(_) => Self::Name(Vec::new()),
-            Self::Bytes(..) => Self::Bytes(Vec::new(), Vec::new()),
+            Self::U8(values) => Self::U8(Vec::with_capacity(values.len())),
+            Self::U16(values) => Self::U16(Vec::with_capacity(values.len())),
+            Self::I16(values) => Self::I16(Vec::with_capacity(values.len())),
+            Self::Small(values) => Self::Small(Vec::with_capacity(values.len())),
+            Self::Large(values) => Self::Large(Vec::with_capacity(values.len())),
+            Self::Float(values) => Self::Float(Vec::with_capacity(values.len())),
+            Self::Name(values) => Self::Name(Vec::with_capacity(values.len())),
+            Self::Bytes(ends, bytes) => {
+                Self::Bytes(Vec::with_capacity(ends.len()), Vec::with_capacity(bytes.len()))
+            }
         };
         std::mem::replace(self, empty)
     }
 
     pub(crate) fn len(&self) -> usize {
-        match self {
-            Self::Small(values) => values.len(),
-            Self::Large(values) => values.len(),
-            Self::Float(values) => values.len(),
-            Self::Name(values) => values.len(),
-            Self::Bytes(ends, _) => ends.len(),
-        }
+        each!(self, values => values.len())
     }
 }
 
