@@ -73,6 +73,7 @@ impl FirmwareReport {
     }
 
     /// The values common to both layouts.
+    #[inline]
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         telemetry_of!(self)

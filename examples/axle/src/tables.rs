@@ -5,6 +5,7 @@
 
 mod column;
 mod described;
+mod hot;
 mod row;
 
 use std::{collections::BTreeMap, mem, rc::Rc};
@@ -23,6 +24,7 @@ use described::Described;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;
 pub(crate) use described::name;
+use hot::Waiting;
 use row::{Row, Slot};
 
 /// Rows of a table after which they go to the sink.
@@ -71,6 +73,10 @@ pub(crate) struct Table {
     pub(crate) numbers: Vec<u64>,
     /// Where each field of a frame goes, behind the columns of its place.
     slots: Vec<Slot>,
+    /// Number of the columns of its place.
+    place: usize,
+    /// Rows whose columns are to be filled.
+    waiting: Waiting,
 }
 
 /// All tables.
@@ -167,9 +173,14 @@ impl Tables {
             self.last = its.map_or(usize::MAX, |at| first + at);
         }
         let mode = frame.commands().and_then(|node| modes.of(node));
-        let added = self.add(self.last, at, |table, from| {
+        let added = self.add(self.last, at, |table| {
+            if let Some(hot) = frame.hot() {
+                table.columns.last_mut().ok_or(Unfit)?.bytes(frame.bytes())?;
+                return if table.waiting.add(hot) { table.fill() } else { Ok(()) };
+            }
+            table.fill()?;
             let (slots, columns) = (&*table.slots, &mut *table.columns);
-            let columns = columns.get_mut(from..).unwrap_or_default();
+            let columns = columns.get_mut(table.place..).unwrap_or_default();
             frame.serialize(Row { slots, columns, whole: frame.bytes(), mode })
         });
         if let Err(unfit) = added {
@@ -181,8 +192,8 @@ impl Tables {
     pub(crate) fn gap(&mut self, at: Place, gap: &SkippedBytes) {
         self.turn_to_day(at.micros);
         let Some(last) = self.all.iter().position(|table| table.protocol.is_none()) else { return };
-        let added = self.add(last, at, |table, from| {
-            let mut columns = table.columns.iter_mut().skip(from);
+        let added = self.add(last, at, |table| {
+            let mut columns = table.columns.iter_mut().skip(table.place);
             let mut next = || columns.next().ok_or(Unfit);
             next()?.unsigned(gap.length)?;
             next()?.text(gap.reason.name())?;
@@ -201,19 +212,19 @@ impl Tables {
         }
     }
 
-    /// Adds a row to a table; `rest` fills the columns from its second argument on. If the row does
+    /// Adds a row to a table; `rest` fills the columns behind those of its place. If the row does
     /// not fit, the table is as before.
     #[inline]
     fn add(
         &mut self,
         table: usize,
         at: Place,
-        rest: impl FnOnce(&mut Table, usize) -> Result<(), Unfit>,
+        rest: impl FnOnce(&mut Table) -> Result<(), Unfit>,
     ) -> Result<(), Unfit> {
         let number = self.count;
         let table = self.all.get_mut(table).ok_or(Unfit)?;
         let rows = table.numbers.len();
-        let added = table.place(at, self.has_times).and_then(|from| rest(table, from));
+        let added = table.place(at).and_then(|()| rest(table));
         if added.is_err() {
             table.columns.iter_mut().for_each(|column| column.take_back(rows));
             return added;
@@ -246,6 +257,7 @@ impl Tables {
         self.held = 0;
         for table in self.others.values_mut().flatten().chain(&mut self.all) {
             if table.numbers.len() >= least {
+                table.fill().map_err(|_| bug())?;
                 sink.rows(table)?;
                 table.numbers.clear();
                 table.columns.iter_mut().for_each(Column::clear);
@@ -295,18 +307,22 @@ impl Table {
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
         let partition = partition.cloned();
-        Self { name, protocol, message, partition, columns, numbers, slots }
+        let waiting = Waiting::default();
+        Self { name, protocol, message, partition, columns, numbers, slots, place, waiting }
     }
 
-    /// Fills the columns of a place, and returns their number.
+    /// Fills the columns of rows that wait.
+    fn fill(&mut self) -> Result<(), Unfit> {
+        self.waiting.fill(self.columns.get_mut(self.place..).unwrap_or_default())
+    }
+
+    /// Fills the columns of a place.
     #[inline]
-    fn place(&mut self, at: Place, has_times: bool) -> Result<usize, Unfit> {
-        let (offset, rest) = self.columns.split_first_mut().ok_or(Unfit)?;
+    fn place(&mut self, at: Place) -> Result<(), Unfit> {
+        let place = self.columns.get_mut(..self.place).ok_or(Unfit)?;
+        let (offset, rest) = place.split_first_mut().ok_or(Unfit)?;
         offset.unsigned(at.offset)?;
-        if !has_times {
-            return Ok(1);
-        }
-        let [t, interface, direction, ..] = rest else { return Err(Unfit) };
+        let [t, interface, direction] = rest else { return Ok(()) };
         match at.micros {
             Some(micros) => t.unsigned(micros)?,
             None => t.absent()?,
@@ -319,7 +335,7 @@ impl Table {
             Some(way) => direction.text(way.name())?,
             None => direction.absent()?,
         }
-        Ok(PLACE.len())
+        Ok(())
     }
 }
 

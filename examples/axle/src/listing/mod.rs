@@ -11,7 +11,7 @@ pub(crate) use event::{LineClock, Place, REASONS, SkippedBytes, pending};
 pub(crate) use json::{seconds, summary as json_summary};
 pub(crate) use out::Out;
 pub(crate) use row::{TimeColumn, print_summary};
-pub(crate) use shown::{Modes, Shown};
+pub(crate) use shown::{Hot, Modes, Shown};
 pub(crate) use table::Table;
 
 /// The form of the lines.

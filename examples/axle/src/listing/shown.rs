@@ -3,8 +3,11 @@
 use std::fmt::Write;
 
 use axlewire::{
-    ikeya::{self, Mode, NodeId, three},
-    ucp,
+    ikeya::{self, Mode, NodeId, Position, three},
+    ucp::{
+        self, Message,
+        message::{FirmwareReport, RawMotorControl, Report},
+    },
 };
 use serde::Serialize;
 
@@ -43,6 +46,15 @@ impl Modes {
     }
 }
 
+/// A frame of a message that most captures are made of: its number, and what is in it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Hot<'a> {
+    Report(u8, &'a FirmwareReport),
+    Control(u8, &'a RawMotorControl),
+    Velocity(u8, f32),
+    Position(u8, Position),
+}
+
 /// A frame of any protocol.
 pub(crate) trait Shown: Serialize + Copy {
     const PROTOCOL: Protocol;
@@ -57,6 +69,11 @@ pub(crate) trait Shown: Serialize + Copy {
     /// The number that, with the name, identifies messages of one kind: node or id.
     fn key(&self) -> u8 {
         self.number()
+    }
+
+    /// The frame as one of those that come often, if it is one.
+    fn hot(&self) -> Option<Hot<'_>> {
+        None
     }
 
     /// Contents as text, with units.
@@ -90,6 +107,14 @@ impl Shown for &ucp::Frame {
         self.id()
     }
 
+    fn hot(&self) -> Option<Hot<'_>> {
+        match self.message() {
+            Message::Report(Report::Firmware(report)) => Some(Hot::Report(self.index(), report)),
+            Message::MotorControl(control) => Some(Hot::Control(self.index(), control)),
+            _ => None,
+        }
+    }
+
     fn contents(&self, out: &mut Out, _: &Modes) {
         // The output never fails.
         let _ = write!(out, "{}", self.message().contents());
@@ -98,7 +123,7 @@ impl Shown for &ucp::Frame {
 
 /// Packets of one kind of board: those of a direction, and of both.
 macro_rules! shown {
-    ($of:path, $protocol:expr) => {
+    ($of:path, $protocol:expr, $hot:expr) => {
         const _: () = {
             use $of as of;
 
@@ -128,6 +153,10 @@ macro_rules! shown {
             impl Shown for of::Response<'_> {
                 shown!(@ common $protocol);
 
+                fn hot(&self) -> Option<Hot<'_>> {
+                    $hot(self)
+                }
+
                 fn teach(&self, modes: &mut Modes) {
                     teach(self, modes);
                 }
@@ -135,6 +164,13 @@ macro_rules! shown {
 
             impl Shown for of::Packet<'_> {
                 shown!(@ common $protocol);
+
+                fn hot(&self) -> Option<Hot<'_>> {
+                    match self {
+                        Self::Request(_) => None,
+                        Self::Response(response) => $hot(response),
+                    }
+                }
 
                 fn commands(&self) -> Option<NodeId> {
                     match self {
@@ -173,5 +209,11 @@ macro_rules! shown {
     };
 }
 
-shown!(ikeya, Protocol::Ikeya);
-shown!(three, Protocol::Ikeya3);
+shown!(ikeya, Protocol::Ikeya, |response: &ikeya::Response<'_>| {
+    let node = response.id().get();
+    Some(match response {
+        ikeya::Response::Velocity(answer) => Hot::Velocity(node, answer.rps()),
+        ikeya::Response::Position(answer) => Hot::Position(node, answer.position()),
+    })
+});
+shown!(three, Protocol::Ikeya3, |_: &three::Response<'_>| None);

@@ -79,6 +79,25 @@ macro_rules! each {
     };
 }
 
+/// A type whose values a column holds as they are.
+pub(super) trait Held: Sized {
+    fn of(values: &mut Values) -> Option<&mut Vec<Self>>;
+}
+
+macro_rules! held {
+    ($($of:ty: $($variant:ident)|+;)+) => {$(
+        impl Held for $of {
+            fn of(values: &mut Values) -> Option<&mut Vec<Self>> {
+                match values {
+                    $(Values::$variant(values))|+ => Some(values),
+                    _ => None,
+                }
+            }
+        }
+    )+};
+}
+held! { u8: U8 | Name; u16: U16; i16: I16; i32: Small; f32: Float; }
+
 /// One value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Cell<'a> {
@@ -220,6 +239,24 @@ impl Column {
         }
         self.is_present();
         Ok(())
+    }
+
+    /// A value for each of some rows.
+    pub(super) fn extend<T: Held>(
+        &mut self,
+        all: impl ExactSizeIterator<Item = T>,
+    ) -> Result<(), Unfit> {
+        if let Some(present) = &mut self.present {
+            present.resize(present.len() + all.len(), true);
+        }
+        T::of(&mut self.values).ok_or(Unfit)?.extend(all);
+        Ok(())
+    }
+
+    /// The same name for this many rows.
+    pub(super) fn names(&mut self, name: &str, rows: usize) -> Result<(), Unfit> {
+        let place = self.names.iter().position(|it| *it == name).ok_or(Unfit)?;
+        self.extend(core::iter::repeat_n(place as u8, rows))
     }
 
     #[inline]
