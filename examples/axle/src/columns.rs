@@ -4,6 +4,7 @@
 
 use std::{
     io::Read,
+    ops::Range,
     path::{Path, PathBuf},
     sync::Mutex,
 };
@@ -52,8 +53,9 @@ impl From<Failure> for Error {
 pub struct Batch {
     /// Protocol and message, such as `ucp.report`; `skipped` for the gaps.
     pub table: String,
-    /// The number of each row among all frames and gaps of the capture, from 0.
-    pub numbers: Vec<u64>,
+    /// The number of each row among all frames and gaps of the capture, from 0: in runs, since
+    /// most rows follow each other.
+    pub numbers: Vec<Range<u64>>,
     /// Of the same length; those of place and time first.
     pub columns: Vec<Column>,
 }
@@ -162,10 +164,15 @@ impl<R: FnMut(Batch) -> Result<(), Failure>> Sink for Taker<R> {
 
 fn take(table: &mut Table) -> Batch {
     // The next batch is often as long.
-    let numbers = Vec::with_capacity(table.numbers.len());
     Batch {
         table: table.name.clone(),
-        numbers: std::mem::replace(&mut table.numbers, numbers),
+        numbers: runs(&table.numbers),
         columns: table.columns.iter_mut().map(Column::take).collect(),
     }
+}
+
+fn runs(numbers: &[u64]) -> Vec<Range<u64>> {
+    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
+    let run = |run: &[u64]| Some(*run.first()?..*run.last()? + 1);
+    runs.filter_map(run).collect()
 }

@@ -3,7 +3,9 @@
 use std::{
     collections::BTreeMap,
     ffi::CString,
+    hint::black_box,
     io::{self, Cursor, Read},
+    ops::Range,
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
@@ -114,7 +116,7 @@ fn raised_text(error: &Error) -> String {
 pub(crate) struct Capture {
     tables: BTreeMap<String, Arc<Vec<RecordBatch>>>,
     /// For each batch, the numbers of its rows among all.
-    numbers: BTreeMap<String, Vec<Vec<u64>>>,
+    numbers: BTreeMap<String, Vec<Vec<Range<u64>>>>,
     schemas: Schemas,
     summary: Summary,
     /// What it was read from: for its name, and for plots.
@@ -135,6 +137,9 @@ pub(crate) fn read(
     let (given, source) = (source.clone().unbind(), Source::of(source)?);
     let signal = Mutex::new(None);
     let result = py.detach(|| {
+        // The allocator of Linux gives each column a mapping of its own, which takes longer than to
+        // fill it, until a block of this size was freed once.
+        drop(black_box(Vec::<u8>::with_capacity(16 << 20)));
         let capture = source.open(protocol.as_deref())?;
         let schemas = Schemas::new(&capture.empty(), units);
         let (mut tables, mut numbers) =

@@ -2,6 +2,7 @@
 
 use std::{
     collections::{BTreeMap, HashMap},
+    ops::Range,
     sync::Arc,
 };
 
@@ -213,7 +214,9 @@ fn column(column: Column) -> ArrayRef {
         ($array:ty, $values:expr) => {
             match present {
                 None => Arc::new(<$array>::from($values)),
-                Some(_) => Arc::new(<$array>::new(spread(present, &$values, |it| it).into(), nulls)),
+                Some(_) => {
+                    Arc::new(<$array>::new(spread(present, &$values, |it| it).into(), nulls))
+                }
             }
         };
     }
@@ -427,14 +430,19 @@ fn times(to: &Bound<'_, PyList>, array: &TimestampMicrosecondArray) -> PyResult<
 /// All frames in their order.
 pub(crate) fn frames(
     tables: &BTreeMap<String, Arc<Vec<RecordBatch>>>,
-    numbers: &BTreeMap<String, Vec<Vec<u64>>>,
+    numbers: &BTreeMap<String, Vec<Vec<Range<u64>>>>,
 ) -> Table {
     let mut rows = Vec::new();
     for (name, batches) in tables.iter().filter(|(name, _)| name.contains('.')) {
         let numbers = numbers.get(name).map(Vec::as_slice).unwrap_or_default();
         for (batch, numbers) in batches.iter().zip(numbers) {
             rows.extend(
-                numbers.iter().enumerate().map(|(row, number)| (*number, name, batch, row)),
+                numbers
+                    .iter()
+                    .cloned()
+                    .flatten()
+                    .enumerate()
+                    .map(|(row, number)| (number, name, batch, row)),
             );
         }
     }
