@@ -56,9 +56,11 @@ cp -r axlewire "$fresh/axlewire"
 cp "$target/asan/x86_64-unknown-linux-gnu/debug/libaxlewire_python.so" \
     "$fresh/axlewire/_axlewire.abi3.so"
 preload=$(clang -print-file-name=libclang_rt.asan-x86_64.so)
+tests=$PWD/tests
+cd "$fresh"
 LD_PRELOAD=$preload ASAN_OPTIONS=detect_leaks=0 PYTHONPATH=$fresh "$python" -c '
 import axlewire, sys
-assert axlewire.__file__.startswith(sys.argv[1])
+assert axlewire.__file__.startswith(sys.argv[1]), axlewire.__file__
 ' "$fresh"
 LD_PRELOAD=$preload ASAN_OPTIONS=detect_leaks=0 PYTHONPATH=$fresh \
-    "$python" -m pytest -q -p no:cacheprovider tests/test_bytes.py
+    "$python" -m pytest -q -p no:cacheprovider "$tests/test_bytes.py" "$tests/test_capture.py"
