@@ -144,7 +144,7 @@ pub extern "C" fn main() -> c_int {
     // SAFETY: reads a register.
     let begin = timer.at(unsafe { HAL_Micros() });
     let slave = Slave::new(NodeId::N1, Mode::Velocity, config, begin);
-    let held_up_after = slave.line_rules().held_up_after.unwrap_or(Duration::MAX);
+    let held_up_after = slave.line_rules().held_up_after.unwrap_or(Duration::from_micros(u32::MAX));
     let mut node = Node { slave, timer, taken: 0, rps: 0.0, empty_at: begin, held_up_after };
     node.begin_to_receive();
     let mut step_at = node.now();
