@@ -103,7 +103,8 @@ def test_a_stop_returns_when_the_motor_is_seen_to_stand(port, rps):
     assert told(port, "node 1: at rest")
 
 
-BEGIN = """import axlewire, gc, os, sys, threading, time
+BEGIN = """import axlewire, gc, os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 port = sys.argv[1]
 class Holder: pass
 def bus(): return axlewire.Bus(port, dead_man_s=None)
@@ -169,6 +170,16 @@ def test_ctrl_c_of_a_terminal_does_not_end_a_simulator():
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert "KeyboardInterrupt" in err and "StopsOwed" not in err, err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@fails("Python ends without its exit functions, and the motor keeps its last command")
+def test_a_motor_is_stopped_when_the_program_is_told_to_end(number, port):
+    process = child("it = bus(); turn(it); print('begins', flush=True); it.wait(30)", port)
+    assert process.stdout.readline() == "begins\n"
+    process.send_signal(number)
+    process.communicate(timeout=30)
+    assert told(port, "node 1: at rest")
 
 
 @fails("a process is left behind for each simulator that is not closed")
