@@ -4,7 +4,7 @@
 #   examples/python/check.sh           all of it
 #   examples/python/check.sh --quick   without engines, notebook, wheel and sanitizers
 #
-# Needs Rust, Python 3.10 or later with venv, and Java for Spark; for the sanitizers also a nightly
+# Needs Rust, Python 3.11 or later with venv, and Java for Spark; for the sanitizers also a nightly
 # compiler and clang.
 set -euo pipefail
 cd "$(dirname "$0")"

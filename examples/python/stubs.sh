@@ -18,7 +18,7 @@ maturin generate-stubs --quiet --out "$made"
     # What maturin cannot know of.
     sed -E -e '/^from types import CapsuleType/d' \
         -e 's/^@final$/&/' \
-        -e 's/-> dict:/-> dict[str, Any]:/; s/-> list:/-> list[Any]:/' \
+        -e 's/-> dict( |:)/-> dict[str, Any]\1/; s/-> list:/-> list[Any]:/' \
         -e 's/__iter__\(self, \/\) -> Any/__iter__(self, \/) -> Iterator[str]/' \
         -e 's/__anext__\(self, \/\) -> Any/__anext__(self, \/) -> Awaitable[Report]/' \
         -e 's/(__exit__.*) -> bool:/\1 -> None:/' \

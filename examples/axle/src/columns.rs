@@ -24,8 +24,8 @@ use crate::{
 /// Why a capture could not be read.
 #[derive(Clone, Debug, Eq, PartialEq)]
 pub enum Error {
-    /// The file cannot be opened or read.
-    Io(String),
+    /// The file cannot be opened or read; with the number of the system's error, if it has one.
+    Io(String, Option<i32>),
     /// There is no capture of these protocols in it.
     Capture(String),
     /// An argument is wrong.
@@ -36,12 +36,11 @@ pub enum Error {
 
 impl From<Failure> for Error {
     fn from(failure: Failure) -> Self {
-        let line = match &failure {
-            Failure::Read { path: None, error } => format!("cannot read the capture: {error}"),
-            _ => failure.to_string(),
-        };
+        let line = told(&failure);
         match failure {
-            Failure::Open { .. } | Failure::Read { .. } => Self::Io(line),
+            Failure::Open { error, .. } | Failure::Read { error, .. } => {
+                Self::Io(line, error.raw_os_error())
+            }
             Failure::Usage(_) => Self::Argument(line),
             _ => Self::Capture(line),
         }
@@ -140,9 +139,15 @@ impl Capture {
         }
         let walked = walked?;
         let (account, times_back) = (walked.account, walked.times_back);
-        let cut = walked.missing().err().map(|failure| failure.to_string());
+        let cut = walked.missing().err().map(|failure| told(&failure));
         Ok(Summary { account, times_back, cut })
     }
+}
+
+/// The line of a failure. For the tool, what has no name is its standard input.
+fn told(failure: &Failure) -> String {
+    let line = failure.to_string();
+    line.replace("\"standard input\"", "the capture").replace("standard input", "the capture")
 }
 
 fn named(protocol: Option<&str>) -> Result<Option<Protocol>, Error> {

@@ -16,11 +16,11 @@ class Bus:
     """
     A motor bus on a serial port (Ikeya MD, boards with one motor).
 
-    Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of the
-    program, and when the object is collected. Between calls a thread of its own serves the line.
-    Call something at least every `dead_man_s`, or `wait`: else the motors are stopped, because
-    whoever is at the keyboard may have gone. Each node is read, and told its set-point again, every
-    `period_s`.
+    Its motors are stopped, and seen to stand still, when the `with` block is left, at the end of
+    the program, and when the object is collected. Between calls a thread of its own serves the
+    line. Call something at least every `dead_man_s`, or `wait`: else the motors are stopped,
+    because whoever is at the keyboard may have gone. Each node is read, and told its set-point
+    again, every `period_s`.
     """
     def __enter__(self, /) -> Bus: ...
     def __exit__(self, /, kind: type | None, value: Any | None, trace: Any | None) -> None: ...
@@ -63,7 +63,8 @@ class Bus:
         """
     def wait(self, /, seconds: SupportsFloat | SupportsIndex) -> None:
         """
-        Waits, and tells the dead-man that somebody is there.
+        Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails, and
+        `NotOnline` if a node that was moved is not heard any more.
         """
 
 @final
@@ -117,7 +118,7 @@ class Decoder:
     """
     def __new__(cls, /, protocol: str) -> Decoder:
         """
-        For `ucp`, `ikeya` or `ikeya3`; packets of both directions.
+        For `ucp`, `ikeya` or `ikeya-3`; packets of both directions.
         """
     def __repr__(self, /) -> str: ...
     @property
@@ -125,14 +126,14 @@ class Decoder:
         """
         The account so far: each byte is in a frame, in a gap, or pending.
         """
-    def feed(self, /, data: "bytes") -> "list[Frame | Gap]":
+    def feed(self, /, data: "Buffer") -> "list[Frame | Gap]":
         """
         Takes in bytes, in pieces of any length; returns the frames and gaps that are decided now.
         """
     def idle(self, /) -> "list[Frame | Gap]":
         """
-        The line is quiet, or the stream has ended: what is pending is no frame any more. Returns what
-        is decided now.
+        The line is quiet, or the stream has ended: what is pending is no frame any more. Returns
+        what is decided now.
         """
     @property
     def pending(self, /) -> int:
@@ -163,7 +164,7 @@ class Frame:
     @property
     def protocol(self, /) -> str:
         """
-        `ucp`, `ikeya` or `ikeya3`.
+        `ucp`, `ikeya` or `ikeya-3`.
         """
     @property
     def raw(self, /) -> bytes:
@@ -178,6 +179,7 @@ class Gap:
     """
     __match_args__: Final[tuple[str, str]]
     def __eq__(self, value: object, /) -> bool: ...
+    def __hash__(self, /) -> int: ...
     def __ne__(self, value: object, /) -> bool: ...
     def __repr__(self, /) -> str: ...
     @property
@@ -244,46 +246,37 @@ class Report:
     """
     def __getattr__(self, name: str, /) -> Any: ...
     def __repr__(self, /) -> str: ...
-    def fields(self, /) -> "dict[str, int | list[int]]":
+    @property
+    def fields(self, /) -> Any:
         """
         All fields with their values.
-        """
-    @property
-    def index(self, /) -> int:
-        """
-        Counter of the robot.
         """
     @property
     def lost(self, /) -> int:
         """
         Number of reports missing between the previous one and this one.
         """
-    @property
-    def version(self, /) -> int | None:
-        """
-        Version of the robot's firmware; `None` if the layout has none.
-        """
 
 @final
 class Reports:
     """
-    The reports of a rover.
+    The reports of a rover, as they come. They end with the line.
     """
     def __aiter__(self, /) -> Reports: ...
-    def __anext__(self, /) -> Awaitable[Report]:
-        """
-        Waits in a thread of the running event loop, for a moment at a time, so that a task can be
-        cancelled.
-        """
+    def __anext__(self, /) -> Awaitable[Report]: ...
     def __iter__(self, /) -> Reports: ...
     def __next__(self, /) -> Report: ...
+    def __repr__(self, /) -> str: ...
     @property
     def dropped(self, /) -> int:
         """
         Reports that were dropped because nobody took them for more than a minute.
         """
     @property
-    def is_over(self, /) -> bool: ...
+    def is_over(self, /) -> bool:
+        """
+        Whether the line is closed. Reports may still wait.
+        """
     def next(self, /, within_s: SupportsFloat | SupportsIndex) -> Report | None:
         """
         The next report; `None` if none comes within this time, or no more come.
@@ -294,9 +287,9 @@ class Rover:
     """
     A rover on a serial port (UCP).
 
-    It is stopped, and seen to stand still, when the `with` block is left, at the end of the program,
-    and when the object is collected. A command without `seconds` ends by itself after half a second
-    if no other follows: whoever is at the keyboard may have gone.
+    It is stopped, and seen to stand still, when the `with` block is left, at the end of the
+    program, and when the object is collected. A command without `seconds` ends by itself after half
+    a second if no other follows: whoever is at the keyboard may have gone.
     """
     def __enter__(self, /) -> Rover: ...
     def __exit__(self, /, kind: type | None, value: Any | None, trace: Any | None) -> None: ...
@@ -308,9 +301,9 @@ class Rover:
         """
     def drive(self, /, speed: SupportsIndex = 0, angular: SupportsIndex = 0, *, seconds: SupportsFloat | SupportsIndex | None = None) -> None:
         """
-        Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that is
-        turned to the right. With `seconds` it then stops, and returns when the rover is seen to
-        stand still; else it returns at once.
+        Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that
+        is turned to the right. With `seconds` it then stops, and returns when the rover is seen
+        to stand still; else it returns at once.
         """
     @property
     def link(self, /) -> str:
@@ -348,6 +341,11 @@ class Scan:
     def __iter__(self, /) -> Scan: ...
     def __next__(self, /) -> Table: ...
     def __repr__(self, /) -> str: ...
+    @property
+    def summary(self, /) -> dict[str, Any] | None:
+        """
+        The account of the bytes, as that of a capture; `None` before the end.
+        """
 
 @final
 class Table:
@@ -401,12 +399,12 @@ def _tool(args: SupportsGetItem[int, str]) -> int:
     Runs the tool `axle` with these arguments, and returns its exit code.
     """
 
-def crc16(data: bytes) -> int:
+def crc16(data: "Buffer") -> int:
     """
     CRC-16 of both protocols (ruling B1).
     """
 
-def ikeya_position(id: SupportsIndex, position: SupportsFloat | SupportsIndex | SupportsLenAndGetItem[SupportsFloat | SupportsIndex]) -> bytes:
+def ikeya_position(id: SupportsIndex, position: Incomplete) -> bytes:
     """
     Slave to master: its position, turns; three for a board with three motors.
     """
@@ -416,17 +414,17 @@ def ikeya_read(id: SupportsIndex) -> bytes:
     Master to slave: asks for the status.
     """
 
-def ikeya_velocity(id: SupportsIndex, velocity: SupportsFloat | SupportsIndex | SupportsLenAndGetItem[SupportsFloat | SupportsIndex]) -> bytes:
+def ikeya_velocity(id: SupportsIndex, velocity: Incomplete) -> bytes:
     """
     Slave to master: its speed, turns per second; three for a board with three motors.
     """
 
-def ikeya_write_position(id: SupportsIndex, position: SupportsFloat | SupportsIndex | SupportsLenAndGetItem[SupportsFloat | SupportsIndex]) -> bytes:
+def ikeya_write_position(id: SupportsIndex, position: Incomplete) -> bytes:
     """
     Master to slave: a position, turns; three for a board with three motors.
     """
 
-def ikeya_write_velocity(id: SupportsIndex, velocity: SupportsFloat | SupportsIndex | SupportsLenAndGetItem[SupportsFloat | SupportsIndex]) -> bytes:
+def ikeya_write_velocity(id: SupportsIndex, velocity: Incomplete) -> bytes:
     """
     Master to slave: a speed, turns per second; three for a board with three motors.
     """

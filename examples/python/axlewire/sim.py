@@ -10,15 +10,26 @@ of `axle sim`: `python -m axlewire sim ikeya --help`.
 
 from __future__ import annotations
 
+import atexit
 import os
 import subprocess
 import sys
 import tempfile
 import time
+import weakref
 from collections.abc import Mapping
 from types import TracebackType
 
 START_WITHIN_S = 10.0
+
+_running: weakref.WeakSet[Simulator] = weakref.WeakSet()
+
+
+# After the motors of this program are stopped: what is registered later is called first.
+@atexit.register
+def _end_all() -> None:
+    for simulator in list(_running):
+        simulator.close()
 
 
 class Simulator(os.PathLike[str]):
@@ -29,8 +40,14 @@ class Simulator(os.PathLike[str]):
         self.path = os.path.join(self._folder.name, "port")
         self._log = os.path.join(self._folder.name, "log")
         command = [sys.executable, "-m", "axlewire", "sim", *arguments, "--link", self.path]
+        self._told: str | None = None
         with open(self._log, "wb") as log:
-            self._process = subprocess.Popen(command, stdout=log, stderr=log)
+            # Not with the signals of a terminal: Ctrl-C is for the program, whose motors are to be
+            # stopped by it.
+            self._process = subprocess.Popen(
+                command, stdout=log, stderr=log, start_new_session=True
+            )
+        _running.add(self)
         end = time.monotonic() + START_WITHIN_S
         while not os.path.exists(self.path):
             if self._process.poll() is not None or time.monotonic() > end:
@@ -42,6 +59,8 @@ class Simulator(os.PathLike[str]):
     @property
     def log(self) -> str:
         """What it has told so far, such as which motor turns."""
+        if self._told is not None:
+            return self._told
         with open(self._log, encoding="utf-8") as log:
             return log.read()
 
@@ -50,7 +69,13 @@ class Simulator(os.PathLike[str]):
         if self._process.poll() is None:
             self._process.terminate()
             self._process.wait()
-        self._folder.cleanup()
+        if self._told is None:
+            self._told = self.log
+            self._folder.cleanup()
+
+    def __del__(self) -> None:
+        if hasattr(self, "_process"):
+            self.close()
 
     def __fspath__(self) -> str:
         return self.path

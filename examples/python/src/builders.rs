@@ -14,6 +14,7 @@ use axlewire::{
     },
 };
 use pyo3::{
+    Borrowed,
     exceptions::{PyTypeError, PyValueError},
     prelude::*,
     types::{PyBytes, PyDict},
@@ -136,10 +137,20 @@ fn node(id: u8) -> PyResult<NodeId> {
 }
 
 /// The values of a board: a number for one motor, three for three.
-#[derive(FromPyObject)]
 pub(crate) enum Motors {
     One(f64),
     Three([f64; 3]),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Motors {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let one = object.extract().map(Self::One);
+        one.or_else(|_| object.extract().map(Self::Three)).map_err(|_| {
+            PyTypeError::new_err("a number is needed, or three for a board with three motors")
+        })
+    }
 }
 
 fn rps(value: f64) -> PyResult<Rps> {

@@ -11,12 +11,12 @@ use axlewire::{
     ikeya::{
         Mode, NodeId, Position, Rps,
         board::{Status, Target},
-        master::{Health, MasterConfig, MasterStatistics, NodeSet, Polling, StopProgress},
+        master::{CommandError, Health, MasterConfig, MasterStatistics, NodeSet, Polling, StopProgress},
     },
     time::Duration,
 };
 use pyo3::{
-    exceptions::{PyKeyError, PyOSError, PyValueError},
+    exceptions::{PyFileNotFoundError, PyKeyError, PyOSError, PyPermissionError, PyValueError},
     prelude::*,
     types::{PyDict, PyType},
 };
@@ -44,14 +44,25 @@ impl Driven for Driver {
     }
 
     fn leave(&mut self) -> Result<(), Trouble> {
+        // Of the ids that were never heard, nobody has moved one.
         let master = self.bus.role();
-        let owed = if self.moved.is_empty() { NodeSet::default() } else { master.stops_owed() };
-        let nodes: NodeSet = self.moved.iter().chain(owed.iter()).collect();
+        let owed = master.stops_owed().iter().filter(|node| master.mode(*node).is_some());
+        let nodes: NodeSet = self.moved.iter().chain(owed).collect();
         if nodes.is_empty() { Ok(()) } else { Ok(self.bus.stop(nodes)?) }
     }
 }
 
 impl Driver {
+    /// Whether the nodes that were moved are still heard.
+    fn hears_all(&self) -> Result<(), Failed> {
+        let master = self.bus.role();
+        let owed = master.stops_owed();
+        let lost = self.moved.iter().find(|node| {
+            owed.contains(*node) && matches!(master.health(*node), None | Some(Health::Abnormal))
+        });
+        lost.map_or(Ok(()), |node| Err(CommandError::NotOnline { node }.into()))
+    }
+
     /// Remembers a node that a command may move, unless the command is refused.
     fn may_move(&mut self, id: NodeId, target: Target) -> Result<(), Failed> {
         self.bus.role().check(id, &target)?;
@@ -102,6 +113,7 @@ impl Bus {
         reply_timeout_s: Option<f64>,
         period_s: f64,
     ) -> PyResult<Self> {
+        py.import("axlewire._signals")?.call_method0("guard")?;
         let path: std::path::PathBuf = port.extract()?;
         let port = path.to_string_lossy().into_owned();
         let mut config = MasterConfig::usb_adapter();
@@ -116,8 +128,7 @@ impl Bus {
             config.nodes = nodes?.into_iter().collect();
         }
         let opened = py.detach(|| drive::Bus::open_with(&port, config));
-        let bus =
-            opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
+        let bus = opened.map_err(|error| not_opened(&port, &error))?;
         let worker = Arc::new(Worker::new(Driver { bus, moved: NodeSet::default() }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);
@@ -171,11 +182,13 @@ impl Bus {
         self.call(py, |driver| driver.bus.stop_all())
     }
 
-    /// Waits, and tells the dead-man that somebody is there.
+    /// Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails, and
+    /// `NotOnline` if a node that was moved is not heard any more.
     fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let end = Instant::now() + Wait::from_micros(span(seconds)?.as_micros().into());
         loop {
-            self.keep_alive(py)?;
+            self.call(py, |driver| driver.hears_all())?;
+            self.worker.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Ok(());
@@ -234,6 +247,16 @@ impl Bus {
 fn alive(driver: &mut Driver) {
     let now = driver.bus.now();
     driver.bus.role_mut().keep_alive(now);
+}
+
+/// The exception of a port that cannot be opened.
+pub(crate) fn not_opened(port: &str, error: &io::Error) -> PyErr {
+    let line = format!("cannot open {port:?}: {error}");
+    match error.kind() {
+        io::ErrorKind::NotFound => PyFileNotFoundError::new_err(line),
+        io::ErrorKind::PermissionDenied => PyPermissionError::new_err(line),
+        _ => PyOSError::new_err(line),
+    }
 }
 
 /// Leaves a line: a wait that Ctrl-C ends, while the thread goes on stopping.
@@ -315,7 +338,7 @@ impl Node {
     fn velocity(&self, py: Python<'_>) -> PyResult<f32> {
         match self.read(py)? {
             Status::Velocity(rps) => Ok(rps),
-            Status::Position(_) => Err(wrong_mode(self.id, Mode::Position)),
+            Status::Position(_) => Err(wrong_mode(py, self.id, Mode::Position)),
         }
     }
 
@@ -336,7 +359,7 @@ impl Node {
             Status::Position(at) => {
                 Ok(f64::from(at.counts()) / f64::from(Position::COUNTS_PER_REVOLUTION))
             }
-            Status::Velocity(_) => Err(wrong_mode(self.id, Mode::Velocity)),
+            Status::Velocity(_) => Err(wrong_mode(py, self.id, Mode::Velocity)),
         }
     }
 
@@ -402,6 +425,6 @@ impl Node {
     }
 }
 
-fn wrong_mode(node: NodeId, mode: Mode) -> PyErr {
-    crate::trouble::Refused::new_err(format!("node {node} is in {mode} mode"))
+fn wrong_mode(py: Python<'_>, node: NodeId, mode: Mode) -> PyErr {
+    Trouble::from(Failed::Bus(CommandError::WrongMode { node, mode })).raised(py)
 }

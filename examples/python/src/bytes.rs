@@ -8,12 +8,25 @@ use axlewire::{
     ucp,
 };
 use pyo3::{
+    Borrowed,
+    buffer::PyBuffer,
     exceptions::{PyAttributeError, PyValueError},
     prelude::*,
     types::{PyBytes, PyDict, PyList},
 };
 use serde::Serialize;
 use serde_json::Value;
+
+/// Whatever holds bytes: `bytes`, `bytearray`, `memoryview` and others.
+pub(crate) struct Data(pub(crate) Vec<u8>);
+
+impl<'py> FromPyObject<'_, 'py> for Data {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(PyBuffer::<u8>::get(&object)?.to_vec(object.py())?))
+    }
+}
 
 /// A value of JSON in Python.
 pub(crate) fn python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
@@ -38,6 +51,13 @@ pub(crate) fn python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py,
             dict.into_any()
         }
     })
+}
+
+/// The fields of a frame in one line, without those that are told elsewhere.
+pub(crate) fn told(fields: &Value) -> String {
+    let fields = fields.as_object().into_iter().flatten();
+    let told = fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
+    told.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(" ")
 }
 
 /// A frame: what it is, and the values in it.
@@ -102,17 +122,13 @@ impl Framed {
     }
 
     fn __repr__(&self) -> String {
-        let fields = self.fields.as_object().into_iter().flatten();
-        let told =
-            fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
-        let told: Vec<_> = told.map(|(name, value)| format!("{name}={value}")).collect();
-        format!("<axlewire.Frame {}.{} {}>", self.protocol, self.message(), told.join(" "))
+        format!("<axlewire.Frame {}.{} {}>", self.protocol, self.message(), told(&self.fields))
     }
 }
 
 /// Bytes that belong to no frame.
 #[pyclass(frozen, get_all, eq, module = "axlewire")]
-#[derive(Eq, PartialEq)]
+#[derive(Eq, Hash, PartialEq)]
 pub(crate) struct Gap {
     /// How many.
     length: u64,
@@ -125,6 +141,12 @@ impl Gap {
     #[classattr]
     #[expect(non_upper_case_globals, reason = "Python's name")]
     const __match_args__: (&'static str, &'static str) = ("length", "reason");
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.hash(&mut hasher);
+        hasher.finish()
+    }
 
     fn __repr__(&self) -> String {
         format!("<axlewire.Gap of {} bytes: {}>", self.length, self.reason)
@@ -233,10 +255,10 @@ impl Decoder {
     }
 
     /// Takes in bytes, in pieces of any length; returns the frames and gaps that are decided now.
-    #[pyo3(signature = (data: "bytes") -> "list[Frame | Gap]")]
-    fn feed(&mut self, py: Python<'_>, data: &[u8]) -> PyResult<Vec<Py<PyAny>>> {
+    #[pyo3(signature = (data: "Buffer") -> "list[Frame | Gap]")]
+    fn feed(&mut self, py: Python<'_>, data: Data) -> PyResult<Vec<Py<PyAny>>> {
         let mut events = Vec::new();
-        self.decoder.feed(py, data, &mut events)?;
+        self.decoder.feed(py, &data.0, &mut events)?;
         Ok(events)
     }
 
@@ -245,12 +267,13 @@ impl Decoder {
     #[pyo3(signature = () -> "list[Frame | Gap]")]
     fn idle(&mut self, py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
         let mut events = Vec::new();
-        self.decoder.feed(py, &[], &mut events)?;
-        while self.decoder.pending() > 0 {
+        loop {
             self.decoder.idle();
             self.decoder.feed(py, &[], &mut events)?;
+            if self.decoder.pending() == 0 {
+                return Ok(events);
+            }
         }
-        Ok(events)
     }
 
     /// Bytes that may be the begin of a frame.

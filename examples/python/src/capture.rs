@@ -5,14 +5,16 @@ use std::{
     ffi::CString,
     hint::black_box,
     io::{self, Cursor, Read},
+    mem::take,
     ops::Range,
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel},
     },
     thread::{self, JoinHandle},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use arrow_array::{RecordBatch, RecordBatchReader};
@@ -21,7 +23,7 @@ use axle::columns::{self, Batch, Error, Summary};
 use pyo3::{
     exceptions::{PyOSError, PyTypeError, PyUserWarning, PyValueError},
     prelude::*,
-    types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyMemoryView, PyString},
+    types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyList, PyMemoryView, PyString},
 };
 
 use crate::table::{Schemas, Table, Units, stream};
@@ -63,50 +65,70 @@ impl Source {
         }
     }
 
-    fn open(self, protocol: Option<&str>) -> Result<columns::Capture, Error> {
+    /// What a file of Python raises goes to `raised`.
+    fn open(self, protocol: Option<&str>, raised: Raised) -> Result<columns::Capture, Error> {
         match self {
             Self::Paths(paths) => columns::Capture::open(&paths, protocol),
             Self::Bytes(bytes) => columns::Capture::of(Box::new(Cursor::new(bytes)), protocol),
-            Self::File(file) => columns::Capture::of(Box::new(PythonFile(file)), protocol),
+            Self::File(file) => {
+                columns::Capture::of(Box::new(PythonFile { file, raised }), protocol)
+            }
         }
     }
 }
 
+/// What a file of Python has raised.
+type Raised = Arc<Mutex<Option<PyErr>>>;
+
 /// A file of Python.
-struct PythonFile(Py<PyAny>);
+struct PythonFile {
+    file: Py<PyAny>,
+    raised: Raised,
+}
 
 impl Read for PythonFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         Python::attach(|py| {
-            let read = self.0.bind(py).call_method1("read", (buffer.len(),)).map_err(io_error)?;
-            let bytes = read.cast::<PyBytes>().map_err(|_| {
-                io::Error::other("read() gave no bytes: open the file with mode \"rb\"")
-            })?;
-            let bytes = bytes.as_bytes();
-            let to = buffer
-                .get_mut(..bytes.len())
-                .ok_or_else(|| io::Error::other("read() gave more bytes than asked for"))?;
-            to.copy_from_slice(bytes);
-            Ok(bytes.len())
+            let mut read = || -> PyResult<usize> {
+                let given = self.file.bind(py).call_method1("read", (buffer.len(),))?;
+                let bytes = given.cast::<PyBytes>().map_err(|_| {
+                    let line = "read() gave no bytes: open the file with mode \"rb\"";
+                    PyOSError::new_err(line)
+                })?;
+                let bytes = bytes.as_bytes();
+                let to = buffer.get_mut(..bytes.len()).ok_or_else(|| {
+                    PyOSError::new_err("read() gave more bytes than asked for")
+                })?;
+                to.copy_from_slice(bytes);
+                Ok(bytes.len())
+            };
+            read().map_err(|error| {
+                let told = io::Error::other(error.to_string());
+                *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                told
+            })
         })
     }
 }
 
-fn io_error(error: PyErr) -> io::Error {
-    io::Error::other(error.to_string())
+/// Fails with what a file has raised.
+fn check_raised(raised: &Raised) -> PyResult<()> {
+    let mut raised = raised.lock().unwrap_or_else(PoisonError::into_inner);
+    raised.take().map_or(Ok(()), Err)
 }
 
 /// The exception of Python for a failure.
 fn raised(error: Error) -> PyErr {
     match &error {
-        Error::Io(line) => PyOSError::new_err(line.clone()),
+        Error::Io(line, Some(number)) => PyOSError::new_err((*number, line.clone())),
+        Error::Io(line, None) => PyOSError::new_err(line.clone()),
         _ => PyValueError::new_err(raised_text(&error)),
     }
 }
 
 fn raised_text(error: &Error) -> String {
     match error {
-        Error::Io(line) | Error::Capture(line) | Error::Argument(line) => line.clone(),
+        Error::Io(line, _) | Error::Capture(line) | Error::Argument(line) => line.clone(),
         Error::Stopped => "reading was stopped".to_owned(),
     }
 }
@@ -133,50 +155,69 @@ pub(crate) fn read(
     protocol: Option<String>,
     units: Option<&str>,
 ) -> PyResult<Capture> {
-    let units = Units::named(units)?;
-    let (given, source) = (source.clone().unbind(), Source::of(source)?);
-    let signal = Mutex::new(None);
-    let result = py.detach(|| {
-        // The allocator of Linux gives each column a mapping of its own, which takes longer than to
-        // fill it, until a block of this size was freed once.
-        drop(black_box(Vec::<u8>::with_capacity(16 << 20)));
-        let capture = source.open(protocol.as_deref())?;
-        let schemas = Schemas::new(&capture.empty(), units);
-        let (mut tables, mut numbers) =
-            (BTreeMap::<_, Vec<_>>::new(), BTreeMap::<_, Vec<_>>::new());
-        let mut next_look = Instant::now();
-        let summary = capture.read(
-            |mut batch| {
-                numbers
-                    .entry(batch.table.clone())
-                    .or_default()
-                    .push(std::mem::take(&mut batch.numbers));
-                let table = batch.table.clone();
-                tables.entry(table).or_default().push(schemas.batch(batch));
-                Ok(())
-            },
-            || {
-                if Instant::now() < next_look {
-                    return Ok(());
-                }
-                next_look = Instant::now() + SIGNALS_EVERY;
-                Python::attach(|py| py.check_signals()).map_err(|raised| {
-                    signal.lock().map(|mut kept| *kept = Some(raised)).unwrap_or_default();
-                    Error::Stopped
-                })
-            },
-        )?;
-        let tables = tables.into_iter().map(|(name, all)| (name, Arc::new(all))).collect();
-        Ok((tables, numbers, schemas, summary))
-    });
-    if let Ok(Some(raised)) = signal.into_inner() {
-        return Err(raised);
-    }
-    let (tables, numbers, schemas, summary) = result.map_err(raised)?;
+    let (units, given, source) =
+        (Units::named(units)?, source.clone().unbind(), Source::of(source)?);
+    let (named, raised, is_over) = (protocol.clone(), Raised::default(), Arc::default());
+    let (theirs, ends): (_, Arc<AtomicBool>) = (Arc::clone(&raised), Arc::clone(&is_over));
+    let (tell, mut told) = sync_channel(1);
+    // In a thread, so that Ctrl-C ends the call whatever the reading waits for.
+    thread::spawn(move || drop(tell.send(whole(source, named.as_deref(), units, theirs, &ends))));
+    let read = loop {
+        let (again, result) = py.detach(move || {
+            let result = told.recv_timeout(SIGNALS_EVERY);
+            (told, result)
+        });
+        told = again;
+        match result {
+            Ok(read) => break read,
+            Err(RecvTimeoutError::Timeout) => {
+                py.check_signals().inspect_err(|_| is_over.store(true, Ordering::Relaxed))?;
+            }
+            Err(RecvTimeoutError::Disconnected) => break Err(Error::Stopped),
+        }
+    };
+    check_raised(&raised)?;
+    let Whole { tables, numbers, schemas, summary } = read.map_err(self::raised)?;
     if let Some(cut) = &summary.cut {
         warn(py, cut)?;
     }
     Ok(Capture { tables, numbers, schemas, summary, source: given, protocol })
+}
+
+/// What was read.
+struct Whole {
+    tables: BTreeMap<String, Arc<Vec<RecordBatch>>>,
+    numbers: BTreeMap<String, Vec<Vec<Range<u64>>>>,
+    schemas: Schemas,
+    summary: Summary,
+}
+
+/// Reads all of a capture.
+fn whole(
+    source: Source,
+    protocol: Option<&str>,
+    units: Units,
+    raised: Raised,
+    is_over: &AtomicBool,
+) -> Result<Whole, Error> {
+    // The allocator of Linux gives each column a mapping of its own, which takes longer than to
+    // fill it, until a block of this size was freed once.
+    drop(black_box(Vec::<u8>::with_capacity(16 << 20)));
+    let capture = source.open(protocol, raised)?;
+    let schemas = Schemas::new(&capture.empty(), units);
+    let mut tables = BTreeMap::<String, Vec<_>>::new();
+    let mut numbers = BTreeMap::<String, Vec<_>>::new();
+    let summary = capture.read(
+        |mut batch| {
+            let table = batch.table.clone();
+            numbers.entry(table.clone()).or_default().push(take(&mut batch.numbers));
+            tables.entry(table).or_default().push(schemas.batch(batch));
+            Ok(())
+        },
+        || if is_over.load(Ordering::Relaxed) { Err(Error::Stopped) } else { Ok(()) },
+    )?;
+    let tables = tables.into_iter().map(|(name, all)| (name, Arc::new(all))).collect();
+    Ok(Whole { tables, numbers, schemas, summary })
 }
 
 #[pymethods]
@@ -281,10 +322,11 @@ impl Capture {
     /// Paths as they are; of bytes, how many.
     fn name(&self, py: Python<'_>) -> PyResult<String> {
         let source = self.source.bind(py);
-        match source.cast::<PyBytes>() {
-            Ok(bytes) => Ok(format!("of {} bytes", bytes.as_bytes().len())),
-            Err(_) => Ok(source.repr()?.to_string()),
-        }
+        let is_named = source.is_instance_of::<PyString>() || source.hasattr("__fspath__")?;
+        Ok(match source.len() {
+            Ok(len) if !is_named && !source.is_instance_of::<PyList>() => format!("of {len} bytes"),
+            _ => source.repr()?.to_string(),
+        })
     }
 
     fn counts(&self) -> impl Iterator<Item = (&String, usize)> {
@@ -304,6 +346,7 @@ pub(crate) struct Scan {
     reading: Mutex<Reading>,
     schemas: Schemas,
     message: Option<String>,
+    raised: Raised,
     /// Once all was read.
     summary: Mutex<Option<Summary>>,
 }
@@ -326,28 +369,41 @@ pub(crate) fn scan(
 ) -> PyResult<Scan> {
     let (units, source) = (Units::named(units)?, Source::of(source)?);
     let (to, batches) = sync_channel(AHEAD);
-    let (say, said) = sync_channel(1);
-    let named = protocol.clone();
-    let reader = thread::spawn(move || run(source, protocol.as_deref(), &say, &to));
+    let (say, mut said) = sync_channel(1);
+    let (named, raised) = (protocol.clone(), Raised::default());
+    let theirs = Arc::clone(&raised);
+    let reader = thread::spawn(move || run(source, protocol.as_deref(), theirs, &say, &to));
     let mut reading = Reading { batches: Some(batches), reader: Some(reader) };
-    let said = Mutex::new(said);
-    let empty = py.detach(|| said.lock().ok().and_then(|said| said.recv().ok()));
-    let Some(empty) = empty else {
-        py.detach(|| reading.end()).map_err(raised)?;
-        return Err(raised(Error::Stopped));
+    let empty = loop {
+        let (again, result) = py.detach(move || {
+            let result = said.recv_timeout(SIGNALS_EVERY);
+            (said, result)
+        });
+        said = again;
+        match result {
+            Ok(empty) => break empty,
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                let ended = py.detach(|| reading.end());
+                check_raised(&raised)?;
+                return Err(self::raised(ended.err().unwrap_or(Error::Stopped)));
+            }
+        }
     };
     let schemas = Schemas::new(&empty, units);
     let message = message.map(|message| schemas.only(message, named.as_deref())).transpose()?;
-    Ok(Scan { reading: Mutex::new(reading), schemas, message, summary: Mutex::new(None) })
+    let (reading, summary) = (Mutex::new(reading), Mutex::new(None));
+    Ok(Scan { reading, schemas, message, raised, summary })
 }
 
 fn run(
     source: Source,
     protocol: Option<&str>,
+    raised: Raised,
     say: &SyncSender<Vec<Batch>>,
     to: &SyncSender<Batch>,
 ) -> Result<Summary, Error> {
-    let capture = source.open(protocol)?;
+    let capture = source.open(protocol, raised)?;
     say.send(capture.empty()).map_err(|_| Error::Stopped)?;
     capture.read(|batch| to.send(batch).map_err(|_| Error::Stopped), || Ok(()))
 }
@@ -408,13 +464,17 @@ impl Scan {
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Table>> {
         loop {
-            match py.detach(|| self.next_batch(SIGNALS_EVERY)).map_err(raised)? {
+            // A list of all, say, asks without a look at signals of its own.
+            py.check_signals()?;
+            let next = py.detach(|| self.next_batch(SIGNALS_EVERY));
+            check_raised(&self.raised)?;
+            match next.map_err(raised)? {
                 Next::Batch(batch) => {
                     let name = batch.table.clone();
                     let batches = Arc::new(vec![self.schemas.batch(batch)]);
                     return Ok(Some(self.schemas.table(&name, batches)));
                 }
-                Next::Waits => py.check_signals()?,
+                Next::Waits => {}
                 Next::End(summary) => {
                     self.end(py, summary)?;
                     return Ok(None);

@@ -15,8 +15,9 @@ use pyo3::prelude::*;
 
 /// CRC-16 of both protocols (ruling B1).
 #[pyfunction]
-fn crc16(data: &[u8]) -> u16 {
-    axlewire::crc16::compute(data)
+#[pyo3(signature = (data: "Buffer"))]
+fn crc16(data: bytes::Data) -> u16 {
+    axlewire::crc16::compute(&data.0)
 }
 
 /// Runs the tool `axle` with these arguments, and returns its exit code.

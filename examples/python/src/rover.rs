@@ -2,27 +2,36 @@
 
 use std::{
     collections::VecDeque,
+    fmt::Display,
     io,
-    sync::{Arc, Condvar, Mutex, PoisonError, Weak},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak},
+    thread,
     time::{Duration as Wait, Instant},
 };
 
 use axlewire::{
-    drive::{self, DriveError},
+    drive::{self, DriveError, Operation},
+    encode::Encode,
     time::Duration,
-    ucp::host::{COAST, HostConfig, HostEvent, Link, ReceivedReport},
+    ucp::{
+        Body, Frame, MAX_LEN, MotorControl,
+        host::{COAST, HostConfig, HostEvent, Link, ReceivedReport, StopProgress},
+        message::{DocumentReport, FirmwareReport},
+    },
 };
 use pyo3::{
-    exceptions::{PyAttributeError, PyOSError, PyValueError},
+    exceptions::{PyAttributeError, PyValueError},
     prelude::*,
-    types::{PyDict, PyType},
+    types::PyType,
 };
+use serde_json::Value;
 
 use crate::{
-    bus::{leave, leave_collected, span},
+    bus::{leave, leave_collected, not_opened, span},
+    bytes::python,
     capture::SIGNALS_EVERY,
     trouble::Trouble,
-    worker::{Driven, Leave, Worker, remember},
+    worker::{Driven, Leave, NAP, Worker, remember},
 };
 
 /// A moment in which the line is served between two jobs.
@@ -37,26 +46,64 @@ const LAG: usize = 4096;
 /// Reports for one iterator.
 #[derive(Default)]
 struct Queue {
-    /// Those that wait, how many were dropped because there were too many, and whether no more
-    /// come.
-    reports: Mutex<(VecDeque<ReceivedReport>, u64, bool)>,
+    waiting: Mutex<Waiting>,
     changed: Condvar,
 }
 
+#[derive(Default)]
+struct Waiting {
+    reports: VecDeque<ReceivedReport>,
+    /// How many were dropped because too many waited.
+    dropped: u64,
+    /// The line is closed.
+    is_over: bool,
+    /// Why the line cannot be served at present.
+    trouble: Option<Trouble>,
+}
+
+/// What comes next.
+enum Next {
+    Report(ReceivedReport),
+    Nothing,
+    End,
+    Lost(Trouble),
+}
+
 impl Queue {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn push(&self, report: ReceivedReport) {
-        let mut reports = self.reports.lock().unwrap_or_else(PoisonError::into_inner);
-        if reports.0.len() == LAG {
-            reports.0.pop_front();
-            reports.1 += 1;
+        let mut waiting = self.lock();
+        if waiting.reports.len() == LAG {
+            waiting.reports.pop_front();
+            waiting.dropped += 1;
         }
-        reports.0.push_back(report);
+        waiting.reports.push_back(report);
+        self.changed.notify_all();
+    }
+
+    fn set_trouble(&self, trouble: Option<&Trouble>) {
+        self.lock().trouble = trouble.cloned();
         self.changed.notify_all();
     }
 
     fn end(&self) {
-        self.reports.lock().unwrap_or_else(PoisonError::into_inner).2 = true;
+        self.lock().is_over = true;
         self.changed.notify_all();
+    }
+
+    fn next(&self, within: Wait) -> Next {
+        let is_idle = |it: &mut Waiting| it.reports.is_empty() && !it.is_over && it.trouble.is_none();
+        let waited = self.changed.wait_timeout_while(self.lock(), within, is_idle);
+        let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        match (waiting.reports.pop_front(), waiting.is_over, &waiting.trouble) {
+            (Some(report), ..) => Next::Report(report),
+            (None, true, _) => Next::End,
+            (None, false, Some(trouble)) => Next::Lost(trouble.clone()),
+            (None, false, None) => Next::Nothing,
+        }
     }
 }
 
@@ -70,29 +117,73 @@ type Failed = DriveError<io::Error>;
 
 impl Driven for Driver {
     fn serve(&mut self) -> Result<(), Trouble> {
-        let queues = &mut self.queues;
-        let tell = |event| {
+        self.queues.retain(|queue| queue.strong_count() > 0);
+        let queues: Vec<_> = self.queues.iter().filter_map(Weak::upgrade).collect();
+        let served = self.rover.run_for(MOMENT, |_, event, _| {
             if let HostEvent::Report(report) = event {
-                queues.retain(|queue| queue.strong_count() > 0);
-                queues.iter().filter_map(Weak::upgrade).for_each(|queue| queue.push(report));
+                queues.iter().for_each(|queue| queue.push(report));
             }
-        };
-        let mut tell = tell;
-        Ok(self.rover.run_for(MOMENT, |_, event, _| tell(event))?)
+        });
+        let served = served.map_err(Trouble::from);
+        queues.iter().for_each(|queue| queue.set_trouble(served.as_ref().err()));
+        served
     }
 
     fn leave(&mut self) -> Result<(), Trouble> {
         let left = if self.has_moved { self.stand() } else { Ok(()) };
         self.queues.iter().filter_map(Weak::upgrade).for_each(|queue| queue.end());
-        Ok(left?)
+        left
     }
 }
 
+/// The calls of the driver do not hand on the reports that come meanwhile; these do.
 impl Driver {
-    fn stand(&mut self) -> Result<(), Failed> {
-        // If it has not left by then, it is repeated; only what is seen counts.
-        let _ = self.rover.stop();
-        self.rover.await_standstill(COAST)
+    fn command(&mut self, command: MotorControl) -> Result<(), Trouble> {
+        let now = self.rover.now();
+        let role = self.rover.role_mut();
+        let has_lamp = role.command().is_some_and(|latest| latest.front_led() != 0);
+        let accepted = role.drive(command.with_front_led(has_lamp), now);
+        accepted.map_err(|refused| Trouble::from(Failed::Rover(refused)))?;
+        self.has_moved = true;
+        Ok(())
+    }
+
+    fn begin_stop(&mut self) {
+        let now = self.rover.now();
+        self.rover.role_mut().stop(now);
+    }
+
+    /// Stops, and waits until the rover is seen to stand still.
+    fn stand(&mut self) -> Result<(), Trouble> {
+        self.begin_stop();
+        let end = self.rover.now() + COAST;
+        loop {
+            let served = self.serve();
+            match self.rover.role().stop_progress() {
+                StopProgress::StandingStill => return Ok(()),
+                progress if self.rover.now() >= end => {
+                    served?;
+                    return Err(Failed::NoStandstill(progress).into());
+                }
+                _ if served.is_err() => thread::sleep(NAP),
+                _ => {}
+            }
+        }
+    }
+
+    fn ping(&mut self, within: Duration) -> Result<Duration, Trouble> {
+        self.rover.role_mut().take_round_trip();
+        let end = self.rover.now() + within;
+        loop {
+            let served = self.serve();
+            if let Some(trip) = self.rover.role_mut().take_round_trip() {
+                return Ok(trip);
+            }
+            served?;
+            if self.rover.now() >= end {
+                return Err(Failed::Timeout(Operation::Ping).into());
+            }
+        }
     }
 }
 
@@ -118,14 +209,14 @@ impl Rover {
         dead_man_s: f64,
         low_ids_only: bool,
     ) -> PyResult<Self> {
+        py.import("axlewire._signals")?.call_method0("guard")?;
         let path: std::path::PathBuf = port.extract()?;
         let port = path.to_string_lossy().into_owned();
         let mut config = HostConfig::usb_adapter();
         (config.baud, config.dead_man) = (baud, span(dead_man_s)?);
         config.low_ids_only = low_ids_only;
         let opened = py.detach(|| drive::Rover::open_with(&port, config));
-        let rover =
-            opened.map_err(|error| PyOSError::new_err(format!("cannot open {port:?}: {error}")))?;
+        let rover = opened.map_err(|error| not_opened(&port, &error))?;
         let worker = Arc::new(Worker::new(Driver { rover, has_moved: false, queues: Vec::new() }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);
@@ -144,11 +235,9 @@ impl Rover {
         seconds: Option<f64>,
     ) -> PyResult<()> {
         let seconds = seconds.map(span).transpose()?;
-        let command = move |driver: &mut Driver| {
-            driver.has_moved = true;
-            driver.rover.drive(speed, angular)
-        };
-        self.call(py, command)?;
+        let command = MotorControl::new(speed, angular)
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        self.call(py, move |driver| driver.command(command))?;
         let Some(seconds) = seconds else { return Ok(()) };
         let end = Instant::now() + Wait::from_micros(seconds.as_micros().into());
         let driven = loop {
@@ -157,15 +246,12 @@ impl Rover {
                 break Ok(());
             }
             let waited = self.sleep(py, left.min(REPEAT));
-            if let Err(error) = waited.and_then(|()| self.call(py, command)) {
+            if let Err(error) = waited.and_then(|()| self.repeat(py, command)) {
                 break Err(error);
             }
         };
         // At once, whatever was raised; the wait may be left by Ctrl-C.
-        let posted = self.worker.post(|driver| {
-            let now = driver.rover.now();
-            driver.rover.role_mut().stop(now);
-        });
+        let posted = self.worker.post(Driver::begin_stop);
         driven.and(posted)?;
         self.stop(py)
     }
@@ -179,7 +265,7 @@ impl Rover {
     #[pyo3(signature = (within_s=1.0))]
     fn ping(&self, py: Python<'_>, within_s: f64) -> PyResult<f64> {
         let within = span(within_s)?;
-        let trip = self.call(py, move |driver| driver.rover.ping(within))?;
+        let trip = self.call(py, move |driver| driver.ping(within))?;
         Ok(f64::from(trip.as_micros()) / 1e6)
     }
 
@@ -203,11 +289,11 @@ impl Rover {
 
     /// The reports from now on, one after another: `for report in rover.reports()` in a thread, or
     /// `async for`.
-    fn reports(&self, py: Python<'_>) -> PyResult<Reports> {
+    fn reports(slf: &Bound<'_, Self>) -> PyResult<Reports> {
         let queue = Arc::new(Queue::default());
         let weak = Arc::downgrade(&queue);
-        self.worker.call(py, move |driver| driver.queues.push(weak))?;
-        Ok(Reports { queue })
+        slf.get().worker.call(slf.py(), move |driver| driver.queues.push(weak))?;
+        Ok(Reports { queue, rover: slf.clone().unbind() })
     }
 
     /// Stops what was moved, waits until it is seen to stand still, and closes the port.
@@ -241,10 +327,15 @@ impl Rover {
     fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Driver) -> Result<T, Failed> + Send + 'static,
+        job: impl FnOnce(&mut Driver) -> Result<T, Trouble> + Send + 'static,
     ) -> PyResult<T> {
-        let result = self.worker.call(py, move |driver| job(driver).map_err(Trouble::from))?;
-        result.map_err(|trouble| trouble.raised(py))
+        self.worker.call(py, job)?.map_err(|trouble| trouble.raised(py))
+    }
+
+    /// Gives a command again, as long as the port works.
+    fn repeat(&self, py: Python<'_>, command: MotorControl) -> PyResult<()> {
+        self.worker.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
+        self.call(py, move |driver| driver.command(command))
     }
 
     fn sleep(&self, py: Python<'_>, span: Wait) -> PyResult<()> {
@@ -254,7 +345,7 @@ impl Rover {
             if left.is_zero() {
                 return Ok(());
             }
-            py.detach(|| std::thread::sleep(left.min(SIGNALS_EVERY)));
+            py.detach(|| thread::sleep(left.min(SIGNALS_EVERY)));
             py.check_signals()?;
         }
     }
@@ -266,10 +357,12 @@ impl Drop for Rover {
     }
 }
 
-/// The reports of a rover.
+/// The reports of a rover, as they come. They end with the line.
 #[pyclass(frozen, module = "axlewire")]
 pub(crate) struct Reports {
     queue: Arc<Queue>,
+    /// Kept, so that the line is not left while somebody listens.
+    rover: Py<Rover>,
 }
 
 #[pymethods]
@@ -280,11 +373,11 @@ impl Reports {
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Report>> {
         loop {
-            let next = py.detach(|| self.wait(SIGNALS_EVERY));
-            match next {
-                (Some(report), _) => return Ok(Some(report.into())),
-                (None, true) => return Ok(None),
-                (None, false) => py.check_signals()?,
+            match py.detach(|| self.queue.next(SIGNALS_EVERY)) {
+                Next::Report(report) => return Ok(Some(report.into())),
+                Next::End => return Ok(None),
+                Next::Lost(trouble) => return Err(trouble.raised(py)),
+                Next::Nothing => py.check_signals()?,
             }
         }
     }
@@ -295,10 +388,12 @@ impl Reports {
         let end = Instant::now() + Wait::from_micros(span(within_s)?.as_micros().into());
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            match py.detach(|| self.wait(left.min(SIGNALS_EVERY))) {
-                (Some(report), _) => return Ok(Some(report.into())),
-                (None, is_over) if is_over || left.is_zero() => return Ok(None),
-                (None, _) => py.check_signals()?,
+            match py.detach(|| self.queue.next(left.min(SIGNALS_EVERY))) {
+                Next::Report(report) => return Ok(Some(report.into())),
+                Next::End => return Ok(None),
+                Next::Lost(trouble) => return Err(trouble.raised(py)),
+                Next::Nothing if left.is_zero() => return Ok(None),
+                Next::Nothing => py.check_signals()?,
             }
         }
     }
@@ -306,34 +401,26 @@ impl Reports {
     /// Reports that were dropped because nobody took them for more than a minute.
     #[getter]
     fn dropped(&self) -> u64 {
-        self.queue.reports.lock().unwrap_or_else(PoisonError::into_inner).1
+        self.queue.lock().dropped
+    }
+
+    /// Whether the line is closed. Reports may still wait.
+    #[getter]
+    fn is_over(&self) -> bool {
+        self.queue.lock().is_over
     }
 
     fn __aiter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
         slf
     }
 
-    /// Waits in a thread of the running event loop, for a moment at a time, so that a task can be
-    /// cancelled.
     fn __anext__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("axlewire._asynchronous")?;
         module.getattr("next_report")?.call1((slf,))
     }
 
-    #[getter]
-    fn is_over(&self) -> bool {
-        self.queue.reports.lock().unwrap_or_else(PoisonError::into_inner).2
-    }
-}
-
-impl Reports {
-    /// The next report, and whether no more come.
-    fn wait(&self, within: Wait) -> (Option<ReceivedReport>, bool) {
-        let reports = self.queue.reports.lock().unwrap_or_else(PoisonError::into_inner);
-        let waited =
-            self.queue.changed.wait_timeout_while(reports, within, |it| it.0.is_empty() && !it.2);
-        let (mut reports, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        (reports.0.pop_front(), reports.2)
+    fn __repr__(&self) -> String {
+        format!("<axlewire.Reports of {}>", self.rover.get().port)
     }
 }
 
@@ -347,46 +434,44 @@ impl From<ReceivedReport> for Report {
     }
 }
 
+impl Report {
+    /// The fields of its frame.
+    fn value(&self) -> PyResult<Value> {
+        let ReceivedReport { telemetry, version, index, .. } = &self.0;
+        let mut memory = [0; MAX_LEN];
+        let frame = match version {
+            Some(version) => FirmwareReport::new(telemetry, *version).frame(*index).encode(&mut memory),
+            None => DocumentReport::new(telemetry).frame(*index).encode(&mut memory),
+        };
+        let wrong = |error: &dyn Display| PyValueError::new_err(error.to_string());
+        let frame = frame.map_err(|error| wrong(&error))?;
+        let frame = Frame::parse(frame).map_err(|error| wrong(&error))?;
+        serde_json::to_value(frame).map_err(|error| wrong(&error))
+    }
+}
+
 #[pymethods]
 impl Report {
-    /// Counter of the robot.
-    #[getter]
-    fn index(&self) -> u8 {
-        self.0.index
-    }
-
     /// Number of reports missing between the previous one and this one.
     #[getter]
     fn lost(&self) -> u8 {
         self.0.lost
     }
 
-    /// Version of the robot's firmware; `None` if the layout has none.
-    #[getter]
-    fn version(&self) -> Option<u16> {
-        self.0.version
-    }
-
     /// All fields with their values.
-    #[pyo3(signature = () -> "dict[str, int | list[int]]")]
-    fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = PyDict::new(py);
-        let value = serde_json::to_value(self.0.telemetry)
-            .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        for (name, value) in value.as_object().into_iter().flatten() {
-            all.set_item(name, crate::bytes::python(py, value)?)?;
-        }
-        Ok(all)
+    #[getter]
+    fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        python(py, &self.value()?)
     }
 
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let fields = self.fields(py)?;
-        fields.get_item(name)?.ok_or_else(|| {
-            PyAttributeError::new_err(format!("a report has no {name}; it has {}", fields.keys()))
-        })
+        match self.value()?.get(name) {
+            Some(value) => python(py, value),
+            None => Err(PyAttributeError::new_err(format!("a report has no {name}"))),
+        }
     }
 
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("<axlewire.Report {} of {}>", self.0.index, self.fields(py)?))
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("<axlewire.Report {}>", crate::bytes::told(&self.value()?)))
     }
 }

@@ -481,11 +481,21 @@ pub(crate) fn frames(
         })
         .collect();
     let (offset, interface) = (whole("offset"), whole("interface"));
+    let directions: StringArray = rows
+        .iter()
+        .map(|(_, _, batch, row)| {
+            let all = of(batch, "direction")?;
+            let all = all.as_any().downcast_ref::<DictionaryArray<Int8Type>>()?;
+            let names = all.values().as_any().downcast_ref::<StringArray>()?;
+            Some(names.value(all.key(*row)?).to_owned())
+        })
+        .collect();
     let columns: Vec<(&str, ArrayRef)> = vec![
         ("number", Arc::new(number)),
         ("offset", Arc::new(offset)),
         ("t", Arc::new(times.with_timezone("UTC"))),
         ("interface", Arc::new(interface)),
+        ("direction", Arc::new(directions)),
         ("protocol", Arc::new(protocols)),
         ("message", Arc::new(messages)),
         ("bytes", Arc::new(bytes)),

@@ -5,7 +5,7 @@
 
 use std::{
     sync::{
-        Mutex, PoisonError, Weak,
+        Arc, Mutex, PoisonError, Weak,
         mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel},
     },
     thread::{self, JoinHandle},
@@ -31,13 +31,15 @@ pub(crate) trait Driven: Send + 'static {
 type Job<D> = Box<dyn FnOnce(&mut D) + Send>;
 
 /// Time until a port that has failed is asked again.
-const NAP: Duration = Duration::from_millis(20);
+pub(crate) const NAP: Duration = Duration::from_millis(20);
 
 /// The thread of a driver.
 pub(crate) struct Worker<D> {
     /// `None` once it is to leave.
     jobs: Mutex<Option<Sender<Job<D>>>>,
     thread: Mutex<Option<JoinHandle<Result<(), Trouble>>>>,
+    /// Why the line could not be served the last time.
+    trouble: Arc<Mutex<Option<Trouble>>>,
 }
 
 /// Something that is to be left before the program ends.
@@ -67,8 +69,10 @@ pub(crate) fn leave_all() -> Vec<Trouble> {
 impl<D: Driven> Worker<D> {
     pub(crate) fn new(driver: D) -> Self {
         let (to, jobs) = channel();
-        let thread = thread::spawn(move || run(driver, &jobs));
-        Self { jobs: Mutex::new(Some(to)), thread: Mutex::new(Some(thread)) }
+        let trouble = Arc::new(Mutex::new(None));
+        let told = Arc::clone(&trouble);
+        let thread = thread::spawn(move || run(driver, &jobs, &told));
+        Self { jobs: Mutex::new(Some(to)), thread: Mutex::new(Some(thread)), trouble }
     }
 
     /// Has a job done, and waits for its result.
@@ -100,6 +104,11 @@ impl<D: Driven> Worker<D> {
         if sent { Ok(()) } else { Err(closed()) }
     }
 
+    /// Why the line cannot be served at present, if so.
+    pub(crate) fn trouble(&self) -> Option<Trouble> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     /// Tells the thread to leave, without waiting.
     pub(crate) fn dismiss(&self) {
         *self.jobs.lock().unwrap_or_else(PoisonError::into_inner) = None;
@@ -128,14 +137,20 @@ fn ended(thread: JoinHandle<Result<(), Trouble>>) -> Result<(), Trouble> {
     thread.join().unwrap_or_else(|_| Err(Trouble::bug()))
 }
 
-fn run<D: Driven>(mut driver: D, jobs: &Receiver<Job<D>>) -> Result<(), Trouble> {
+fn run<D: Driven>(
+    mut driver: D,
+    jobs: &Receiver<Job<D>>,
+    told: &Mutex<Option<Trouble>>,
+) -> Result<(), Trouble> {
     loop {
         match jobs.try_recv() {
             Ok(job) => job(&mut driver),
             Err(TryRecvError::Empty) => {
-                if driver.serve().is_err() {
+                let trouble = driver.serve().err();
+                if trouble.is_some() {
                     thread::sleep(NAP);
                 }
+                *told.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
             }
             Err(TryRecvError::Disconnected) => return driver.leave(),
         }
