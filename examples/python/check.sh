@@ -21,8 +21,8 @@ cargo fmt --check
 cargo clippy --quiet -- -D warnings
 maturin develop --quiet --release
 ./stubs.sh --check
-mypy --strict axlewire
-pyright --pythonpath "$python" axlewire
+mypy --strict axlewire tests/typed_program.py
+pyright --pythonpath "$python" axlewire tests/typed_program.py
 
 echo "== tests"
 if [ "${1-}" = --quick ]; then

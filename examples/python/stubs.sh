@@ -17,7 +17,8 @@ maturin generate-stubs --quiet --out "$made"
     echo 'from axlewire._picture import Picture'
     # What maturin cannot know of.
     sed -E -e '/^from types import CapsuleType/d' \
-        -e 's/^@final$/&/' \
+        -e '0,/__match_args__: .*/s//__match_args__ = ("message", "raw")/' \
+        -e '/^class Gap/,/__repr__/s/__match_args__: .*/__match_args__ = ("length", "reason")/' \
         -e 's/-> dict( |:)/-> dict[str, Any]\1/; s/-> list:/-> list[Any]:/' \
         -e 's/__iter__\(self, \/\) -> Any/__iter__(self, \/) -> Iterator[str]/' \
         -e 's/__anext__\(self, \/\) -> Any/__anext__(self, \/) -> Awaitable[Report]/' \
