@@ -404,7 +404,7 @@ def crc16(data: "Buffer") -> int:
     CRC-16 of both protocols (ruling B1).
     """
 
-def ikeya_position(id: SupportsIndex, position: Incomplete) -> bytes:
+def ikeya_position(id: SupportsIndex, position: "float | Sequence[float]") -> bytes:
     """
     Slave to master: its position, turns; three for a board with three motors.
     """
@@ -414,17 +414,17 @@ def ikeya_read(id: SupportsIndex) -> bytes:
     Master to slave: asks for the status.
     """
 
-def ikeya_velocity(id: SupportsIndex, velocity: Incomplete) -> bytes:
+def ikeya_velocity(id: SupportsIndex, velocity: "float | Sequence[float]") -> bytes:
     """
     Slave to master: its speed, turns per second; three for a board with three motors.
     """
 
-def ikeya_write_position(id: SupportsIndex, position: Incomplete) -> bytes:
+def ikeya_write_position(id: SupportsIndex, position: "float | Sequence[float]") -> bytes:
     """
     Master to slave: a position, turns; three for a board with three motors.
     """
 
-def ikeya_write_velocity(id: SupportsIndex, velocity: Incomplete) -> bytes:
+def ikeya_write_velocity(id: SupportsIndex, velocity: "float | Sequence[float]") -> bytes:
     """
     Master to slave: a speed, turns per second; three for a board with three motors.
     """
@@ -534,4 +534,18 @@ def ucp_unknown(id: SupportsIndex, body: SupportsGetItem[int, SupportsIndex] = .
     A frame of no known message (rulings U3, U13).
     """
 
-def __getattr__(name: str) -> Incomplete: ...
+
+class Error(Exception):
+    nodes: list[int]
+
+class StopsOwed(Error): ...
+
+class StillMoving(Error): ...
+
+class NotOnline(Error): ...
+
+class Refused(Error): ...
+
+class NoAnswer(Error): ...
+
+class PortLost(Error): ...

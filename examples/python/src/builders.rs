@@ -178,7 +178,7 @@ pub(crate) fn ikeya_read(py: Python<'_>, id: u8) -> Built<'_> {
 
 /// Master to slave: a speed, turns per second; three for a board with three motors.
 #[pyfunction]
-#[pyo3(signature = (id, velocity))]
+#[pyo3(signature = (id, velocity: "float | Sequence[float]"))]
 pub(crate) fn ikeya_write_velocity(py: Python<'_>, id: u8, velocity: Motors) -> Built<'_> {
     match velocity {
         Motors::One(one) => bytes(py, ikeya::WriteRequest::velocity(node(id)?, rps(one)?)),
@@ -188,7 +188,7 @@ pub(crate) fn ikeya_write_velocity(py: Python<'_>, id: u8, velocity: Motors) -> 
 
 /// Master to slave: a position, turns; three for a board with three motors.
 #[pyfunction]
-#[pyo3(signature = (id, position))]
+#[pyo3(signature = (id, position: "float | Sequence[float]"))]
 pub(crate) fn ikeya_write_position(py: Python<'_>, id: u8, position: Motors) -> Built<'_> {
     match position {
         Motors::One(one) => bytes(py, ikeya::WriteRequest::position(node(id)?, turns(one)?)),
@@ -200,7 +200,7 @@ pub(crate) fn ikeya_write_position(py: Python<'_>, id: u8, position: Motors) -> 
 
 /// Slave to master: its speed, turns per second; three for a board with three motors.
 #[pyfunction]
-#[pyo3(signature = (id, velocity))]
+#[pyo3(signature = (id, velocity: "float | Sequence[float]"))]
 pub(crate) fn ikeya_velocity(py: Python<'_>, id: u8, velocity: Motors) -> Built<'_> {
     match velocity {
         Motors::One(one) => bytes(py, ikeya::VelocityResponse::new(node(id)?, rps(one)?)),
@@ -210,7 +210,7 @@ pub(crate) fn ikeya_velocity(py: Python<'_>, id: u8, velocity: Motors) -> Built<
 
 /// Slave to master: its position, turns; three for a board with three motors.
 #[pyfunction]
-#[pyo3(signature = (id, position))]
+#[pyo3(signature = (id, position: "float | Sequence[float]"))]
 pub(crate) fn ikeya_position(py: Python<'_>, id: u8, position: Motors) -> Built<'_> {
     match position {
         Motors::One(one) => bytes(py, ikeya::PositionResponse::new(node(id)?, turns(one)?)),

@@ -11,7 +11,9 @@ use axlewire::{
     ikeya::{
         Mode, NodeId, Position, Rps,
         board::{Status, Target},
-        master::{CommandError, Health, MasterConfig, MasterStatistics, NodeSet, Polling, StopProgress},
+        master::{
+            CommandError, Health, MasterConfig, MasterStatistics, NodeSet, Polling, StopProgress,
+        },
     },
     time::Duration,
 };
@@ -182,8 +184,8 @@ impl Bus {
         self.call(py, |driver| driver.bus.stop_all())
     }
 
-    /// Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails, and
-    /// `NotOnline` if a node that was moved is not heard any more.
+    /// Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails,
+    /// and `NotOnline` if a node that was moved is not heard any more.
     fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let end = Instant::now() + Wait::from_micros(span(seconds)?.as_micros().into());
         loop {

@@ -56,7 +56,8 @@ pub(crate) fn python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py,
 /// The fields of a frame in one line, without those that are told elsewhere.
 pub(crate) fn told(fields: &Value) -> String {
     let fields = fields.as_object().into_iter().flatten();
-    let told = fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
+    let told =
+        fields.filter(|(name, _)| !["protocol", "message", "bytes"].contains(&name.as_str()));
     told.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(" ")
 }
 

@@ -96,9 +96,9 @@ impl Read for PythonFile {
                     PyOSError::new_err(line)
                 })?;
                 let bytes = bytes.as_bytes();
-                let to = buffer.get_mut(..bytes.len()).ok_or_else(|| {
-                    PyOSError::new_err("read() gave more bytes than asked for")
-                })?;
+                let to = buffer
+                    .get_mut(..bytes.len())
+                    .ok_or_else(|| PyOSError::new_err("read() gave more bytes than asked for"))?;
                 to.copy_from_slice(bytes);
                 Ok(bytes.len())
             };

@@ -95,7 +95,8 @@ impl Queue {
     }
 
     fn next(&self, within: Wait) -> Next {
-        let is_idle = |it: &mut Waiting| it.reports.is_empty() && !it.is_over && it.trouble.is_none();
+        let is_idle =
+            |it: &mut Waiting| it.reports.is_empty() && !it.is_over && it.trouble.is_none();
         let waited = self.changed.wait_timeout_while(self.lock(), within, is_idle);
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
         match (waiting.reports.pop_front(), waiting.is_over, &waiting.trouble) {
@@ -440,7 +441,9 @@ impl Report {
         let ReceivedReport { telemetry, version, index, .. } = &self.0;
         let mut memory = [0; MAX_LEN];
         let frame = match version {
-            Some(version) => FirmwareReport::new(telemetry, *version).frame(*index).encode(&mut memory),
+            Some(version) => {
+                FirmwareReport::new(telemetry, *version).frame(*index).encode(&mut memory)
+            }
             None => DocumentReport::new(telemetry).frame(*index).encode(&mut memory),
         };
         let wrong = |error: &dyn Display| PyValueError::new_err(error.to_string());
