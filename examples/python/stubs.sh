@@ -11,7 +11,7 @@ maturin generate-stubs --quiet --out "$made"
 {
     echo '# Made by stubs.sh: do not edit.'
     echo 'import os'
-    echo 'from collections.abc import Awaitable, Iterator, Sequence'
+    echo 'from collections.abc import Awaitable, Iterable, Iterator, Sequence'
     echo 'from typing import IO, TypeAlias'
     echo 'from typing_extensions import Buffer, CapsuleType'
     echo 'from axlewire._picture import Picture'

@@ -19,7 +19,9 @@ class Picture:
         return self.svg
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file, as SVG."""
+        """Writes it to a file that ends in .svg; `python -m axlewire plot` draws PNG and HTML."""
+        if Path(path).suffix.lower() != ".svg":
+            raise ValueError(f"{os.fspath(path)!r} does not end in .svg")
         Path(path).write_text(self.svg, encoding="utf-8")
 
     def __repr__(self) -> str:

@@ -102,7 +102,9 @@ fn telemetry(fields: Option<&Bound<'_, PyDict>>) -> PyResult<Telemetry> {
     Ok(of)
 }
 
-/// Robot to host: what it measures, with the fields of `capture["report"]`.
+/// Robot to host: what it measures. The fields are those of a `Report`: `battery_pct`, `rpm`
+/// (four), `acc`, `gyro`, `mag` (three each), `heading`, `power_w`, `voltage_dv`, `current_ca`; all
+/// 0 if not given.
 #[pyfunction]
 #[pyo3(signature = (*, version = 38, index = 0, **fields: "int | Sequence[int]"))]
 pub(crate) fn ucp_report<'py>(

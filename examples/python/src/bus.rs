@@ -24,7 +24,7 @@ use pyo3::{
 };
 
 use crate::{
-    capture::SIGNALS_EVERY,
+    capture::{SIGNALS_EVERY, warn},
     trouble::Trouble,
     worker::{Driven, Leave, Worker, remember},
 };
@@ -36,6 +36,8 @@ struct Driver {
     bus: drive::Bus,
     /// Nodes that had a set-point.
     moved: NodeSet,
+    /// How often the dead-man had fired at the latest call.
+    fired: u32,
 }
 
 type Failed = DriveError<io::Error>;
@@ -56,13 +58,19 @@ impl Driven for Driver {
 
 impl Driver {
     /// Whether the nodes that were moved are still heard.
-    fn hears_all(&self) -> Result<(), Failed> {
+    fn hears_all(&self) -> Result<(), Trouble> {
         let master = self.bus.role();
         let owed = master.stops_owed();
-        let lost = self.moved.iter().find(|node| {
+        Trouble::not_heard(self.moved.iter().filter(|node| {
             owed.contains(*node) && matches!(master.health(*node), None | Some(Health::Abnormal))
-        });
-        lost.map_or(Ok(()), |node| Err(CommandError::NotOnline { node }.into()))
+        }))
+        .map_or(Ok(()), Err)
+    }
+
+    /// Whether the dead-man has fired since the latest call.
+    fn has_fired(&mut self) -> bool {
+        let fired = self.bus.role().statistics().dead_man;
+        std::mem::replace(&mut self.fired, fired) != fired
     }
 
     /// Remembers a node that a command may move, unless the command is refused.
@@ -104,12 +112,12 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (
-        port: "str | os.PathLike[str]", *, nodes=None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None, period_s=0.02
+        port: "str | os.PathLike[str]", *, nodes: "Iterable[int] | None" = None, baud=500_000, dead_man_s=Some(2.0), reply_timeout_s=None, period_s=0.02
     ))]
     fn new(
         py: Python<'_>,
         port: &Bound<'_, PyAny>,
-        nodes: Option<Vec<u8>>,
+        nodes: Option<Bound<'_, PyAny>>,
         baud: u32,
         dead_man_s: Option<f64>,
         reply_timeout_s: Option<f64>,
@@ -126,12 +134,12 @@ impl Bus {
             config.reply_timeout = span(seconds)?;
         }
         if let Some(nodes) = nodes {
-            let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
-            config.nodes = nodes?.into_iter().collect();
+            let nodes = nodes.try_iter()?.map(|node| id(node?.extract()?));
+            config.nodes = nodes.collect::<PyResult<Vec<_>>>()?.into_iter().collect();
         }
         let opened = py.detach(|| drive::Bus::open_with(&port, config));
         let bus = opened.map_err(|error| not_opened(&port, &error))?;
-        let worker = Arc::new(Worker::new(Driver { bus, moved: NodeSet::default() }));
+        let worker = Arc::new(Worker::new(Driver { bus, moved: NodeSet::default(), fired: 0 }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);
         Ok(Self { worker, port })
@@ -179,7 +187,9 @@ impl Bus {
         })
     }
 
-    /// Stops every node that may be on this bus, heard or not.
+    /// Stops every node that may be on this bus, heard or not. Those that were never heard cannot
+    /// confirm it, so `StopsOwed` is raised for them: say with `Bus(..., nodes=[1, 2])` which ids
+    /// there are. `stop()` is for the nodes that you have moved.
     fn stop_all(&self, py: Python<'_>) -> PyResult<()> {
         self.call(py, |driver| driver.bus.stop_all())
     }
@@ -293,15 +303,19 @@ impl Drop for Bus {
 }
 
 impl Bus {
-    fn call<T: Send + 'static>(
+    fn call<T: Send + 'static, E: Into<Trouble>>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Driver) -> Result<T, Failed> + Send + 'static,
+        job: impl FnOnce(&mut Driver) -> Result<T, E> + Send + 'static,
     ) -> PyResult<T> {
-        let result = self.worker.call(py, move |driver| {
+        let (result, has_fired) = self.worker.call(py, move |driver| {
+            let has_fired = driver.has_fired();
             alive(driver);
-            job(driver).map_err(Trouble::from)
+            (job(driver).map_err(Into::into), has_fired)
         })?;
+        if has_fired {
+            warn(py, "the dead-man has stopped the motors: nothing was called for `dead_man_s`")?;
+        }
         result.map_err(|trouble| trouble.raised(py))
     }
 }

@@ -146,7 +146,13 @@ pub(crate) struct Capture {
     protocol: Option<String>,
 }
 
-/// Reads a capture as a whole.
+/// Reads a capture as a whole: a path, several, a folder, bytes, or a file open for reading bytes.
+///
+/// It may be pcapng, pcap, or raw bytes, packed with gzip or not. `protocol` names that of raw
+/// bytes: "ucp", "ikeya" or "ikeya-3"; without it, it is found out. With `units="si"` each measured
+/// column has another one beside it, such as `rpm_0_si` in rad/s, as `f64`. Of a damaged capture it
+/// reads what there is, and warns; without any frame, all tables are empty. Raises OSError if the
+/// file cannot be read, and ValueError if it is no capture.
 #[pyfunction]
 #[pyo3(signature = (source: "Source", *, protocol=None, units=None))]
 pub(crate) fn read(
@@ -248,7 +254,10 @@ impl Capture {
         self.tables.keys().cloned().collect()
     }
 
-    /// The bytes that belong to no frame, with the reasons.
+    /// The bytes that belong to no frame. `reason` tells why no frame starts at the first of them:
+    /// `header` (not the begin of a frame), `length` (no frame is so long), `id` (no such node),
+    /// `crc` (damaged, or not a frame) or `idle` (cut off). If there are several reasons,
+    /// `reasons_header` and the others tell how many bytes each has.
     #[getter]
     fn gaps(&self) -> PyResult<Table> {
         self.__getitem__("skipped")
@@ -357,7 +366,10 @@ struct Reading {
     reader: Option<JoinHandle<Result<Summary, Error>>>,
 }
 
-/// Begins to read a capture.
+/// Reads a capture batch by batch, in a thread of its own: memory does not grow with its length.
+///
+/// Gives tables of up to 65,536 rows. With `message` they are of that message only, and the scan is
+/// itself a stream of Arrow. The rest is as with `read`.
 #[pyfunction]
 #[pyo3(signature = (source: "Source", *, protocol=None, message=None, units=None))]
 pub(crate) fn scan(
@@ -559,8 +571,8 @@ fn account_of<'py>(py: Python<'py>, summary: &Summary) -> PyResult<Bound<'py, Py
     Ok(dict)
 }
 
-/// What is missing of a capture, as a warning.
-fn warn(py: Python<'_>, cut: &str) -> PyResult<()> {
+/// Something that is no error, as a warning.
+pub(crate) fn warn(py: Python<'_>, cut: &str) -> PyResult<()> {
     let line = CString::new(cut.replace('\0', " ")).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)
 }

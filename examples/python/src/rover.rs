@@ -226,7 +226,7 @@ impl Rover {
 
     /// Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that
     /// is turned to the right. With `seconds` it then stops, and returns when the rover is seen
-    /// to stand still; else it returns at once.
+    /// to stand still, which takes another second or so; else it returns at once.
     #[pyo3(signature = (speed=0, angular=0, *, seconds=None))]
     fn drive(
         &self,
@@ -425,7 +425,9 @@ impl Reports {
     }
 }
 
-/// A report of a rover, as it was received: the fields of `capture["report"]`.
+/// A report of a rover, as it was received: `battery_pct`, `rpm` (four), `acc`, `gyro`, `mag`
+/// (three each), `heading`, `power_w`, `voltage_dv`, `current_ca`, `version`. A capture has arrays
+/// as columns `rpm_0` to `rpm_3`, which tell units and meaning.
 #[pyclass(frozen, module = "axlewire")]
 pub(crate) struct Report(ReceivedReport);
 

@@ -96,7 +96,9 @@ impl Schemas {
         has_rows: impl Fn(&str) -> bool,
     ) -> Option<String> {
         let is_it = |name: &&String| {
-            *name == message || name.split_once('.').is_some_and(|(_, rest)| rest == message)
+            *name == message
+                || name.split_once('.').is_some_and(|(_, rest)| rest == message)
+                || (*name, message) == (&"skipped".to_owned(), "gaps")
         };
         let mut known: Vec<_> = self.all.iter().map(|(name, _)| name).filter(is_it).collect();
         known.sort_by_key(|name| !has_rows(name));

@@ -4,7 +4,10 @@ use std::fmt::Display;
 
 use axlewire::{
     drive::DriveError,
-    ikeya::master::{CommandError, NodeSet},
+    ikeya::{
+        NodeId,
+        master::{CommandError, NodeSet},
+    },
     ucp::host::CommandError as Refusal,
 };
 use pyo3::{create_exception, exceptions::PyException, prelude::*};
@@ -27,6 +30,9 @@ create_exception!(axlewire, Refused, Error, "The command is refused, and nothing
 create_exception!(axlewire, NoAnswer, Error, "Nothing was answered in time.");
 create_exception!(axlewire, PortLost, Error, "The port has failed or is closed.");
 
+/// The exception's text, and its nodes, are those of the Rust library, with what to do here.
+const TO_DISCOVER: &str = ": `discover` asks for it";
+
 /// A failure, in the thread of a driver.
 #[derive(Clone, Debug)]
 pub(crate) struct Trouble {
@@ -47,6 +53,14 @@ enum Kind {
 }
 
 impl Trouble {
+    /// These nodes are not heard any more.
+    pub(crate) fn not_heard(nodes: impl Iterator<Item = NodeId>) -> Option<Self> {
+        let nodes: Vec<_> = nodes.map(NodeId::get).collect();
+        let named: Vec<_> = nodes.iter().map(u8::to_string).collect();
+        let text = format!("not heard any more: node {}; it may be moving", named.join(", "));
+        (!nodes.is_empty()).then_some(Self { kind: Kind::NotOnline, text, nodes })
+    }
+
     /// The thread has ended by a bug: what it has moved may be moving.
     pub(crate) fn bug() -> Self {
         let text = "the package has a bug and gave up: what was moved may be moving".to_owned();
@@ -83,12 +97,13 @@ fn ids(nodes: NodeSet) -> Vec<u8> {
 
 impl<E: Display> From<DriveError<E>> for Trouble {
     fn from(error: DriveError<E>) -> Self {
-        let text = error.to_string();
+        let mut text = error.to_string();
         let (kind, nodes) = match error {
             DriveError::StopsOwed(nodes) => (Kind::StopsOwed, ids(nodes)),
             DriveError::StillMoving(nodes) => (Kind::StillMoving, ids(nodes)),
             DriveError::NoStandstill(_) => (Kind::StillMoving, Vec::new()),
             DriveError::Bus(CommandError::NotOnline { node }) => {
+                text.push_str(TO_DISCOVER);
                 (Kind::NotOnline, vec![node.get()])
             }
             DriveError::Bus(
