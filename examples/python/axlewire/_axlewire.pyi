@@ -1,6 +1,6 @@
 # Made by stubs.sh: do not edit.
 import os
-from collections.abc import Awaitable, Iterator, Sequence
+from collections.abc import Awaitable, Iterable, Iterator, Sequence
 from typing import IO, TypeAlias
 from typing_extensions import Buffer, CapsuleType
 from axlewire._picture import Picture
@@ -28,7 +28,7 @@ class Bus:
         """
         A node by its id, 1 to 8.
         """
-    def __new__(cls, /, port: "str | os.PathLike[str]", *, nodes: SupportsGetItem[int, SupportsIndex] | None = None, baud: SupportsIndex = 500000, dead_man_s: SupportsFloat | SupportsIndex | None = ..., reply_timeout_s: SupportsFloat | SupportsIndex | None = None, period_s: SupportsFloat | SupportsIndex = 0.02) -> Bus: ...
+    def __new__(cls, /, port: "str | os.PathLike[str]", *, nodes: "Iterable[int] | None" = None, baud: SupportsIndex = 500000, dead_man_s: SupportsFloat | SupportsIndex | None = ..., reply_timeout_s: SupportsFloat | SupportsIndex | None = None, period_s: SupportsFloat | SupportsIndex = 0.02) -> Bus: ...
     def __repr__(self, /) -> str: ...
     def close(self, /) -> None:
         """
@@ -59,12 +59,14 @@ class Bus:
         """
     def stop_all(self, /) -> None:
         """
-        Stops every node that may be on this bus, heard or not.
+        Stops every node that may be on this bus, heard or not. Those that were never heard cannot
+        confirm it, so `StopsOwed` is raised for them: say with `Bus(..., nodes=[1, 2])` which ids
+        there are. `stop()` is for the nodes that you have moved.
         """
     def wait(self, /, seconds: SupportsFloat | SupportsIndex) -> None:
         """
-        Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails, and
-        `NotOnline` if a node that was moved is not heard any more.
+        Waits, and tells the dead-man that somebody is there. Raises `PortLost` if the port fails,
+        and `NotOnline` if a node that was moved is not heard any more.
         """
 
 @final
@@ -93,7 +95,10 @@ class Capture:
     @property
     def gaps(self, /) -> Table:
         """
-        The bytes that belong to no frame, with the reasons.
+        The bytes that belong to no frame. `reason` tells why no frame starts at the first of them:
+        `header` (not the begin of a frame), `length` (no frame is so long), `id` (no such node),
+        `crc` (damaged, or not a frame) or `idle` (cut off). If there are several reasons,
+        `reasons_header` and the others tell how many bytes each has.
         """
     def keys(self, /) -> list[str]:
         """
@@ -242,7 +247,9 @@ class Node:
 @final
 class Report:
     """
-    A report of a rover, as it was received: the fields of `capture["report"]`.
+    A report of a rover, as it was received: `battery_pct`, `rpm` (four), `acc`, `gyro`, `mag`
+    (three each), `heading`, `power_w`, `voltage_dv`, `current_ca`, `version`. A capture has arrays
+    as columns `rpm_0` to `rpm_3`, which tell units and meaning.
     """
     def __getattr__(self, name: str, /) -> Any: ...
     def __repr__(self, /) -> str: ...
@@ -303,7 +310,7 @@ class Rover:
         """
         Drives: percent of the speed ahead, and percent of turn, positive as a steering wheel that
         is turned to the right. With `seconds` it then stops, and returns when the rover is seen
-        to stand still; else it returns at once.
+        to stand still, which takes another second or so; else it returns at once.
         """
     @property
     def link(self, /) -> str:
@@ -431,12 +438,21 @@ def ikeya_write_velocity(id: SupportsIndex, velocity: "float | Sequence[float]")
 
 def read(source: "Source", *, protocol: str | None = None, units: str | None = None) -> Capture:
     """
-    Reads a capture as a whole.
+    Reads a capture as a whole: a path, several, a folder, bytes, or a file open for reading bytes.
+
+    It may be pcapng, pcap, or raw bytes, packed with gzip or not. `protocol` names that of raw
+    bytes: "ucp", "ikeya" or "ikeya-3"; without it, it is found out. With `units="si"` each measured
+    column has another one beside it, such as `rpm_0_si` in rad/s, as `f64`. Of a damaged capture it
+    reads what there is, and warns; without any frame, all tables are empty. Raises OSError if the
+    file cannot be read, and ValueError if it is no capture.
     """
 
 def scan(source: "Source", *, protocol: str | None = None, message: str | None = None, units: str | None = None) -> Scan:
     """
-    Begins to read a capture.
+    Reads a capture batch by batch, in a thread of its own: memory does not grow with its length.
+
+    Gives tables of up to 65,536 rows. With `message` they are of that message only, and the scan is
+    itself a stream of Arrow. The rest is as with `read`.
     """
 
 def ucp_bias_request(*, index: SupportsIndex = 0) -> bytes:
@@ -526,7 +542,9 @@ def ucp_pong(err: SupportsIndex = ..., *, index: SupportsIndex = 0) -> bytes:
 
 def ucp_report(*, version: SupportsIndex = 38, index: SupportsIndex = 0, **fields: "int | Sequence[int]") -> bytes:
     """
-    Robot to host: what it measures, with the fields of `capture["report"]`.
+    Robot to host: what it measures. The fields are those of a `Report`: `battery_pct`, `rpm`
+    (four), `acc`, `gyro`, `mag` (three each), `heading`, `power_w`, `voltage_dv`, `current_ca`; all
+    0 if not given.
     """
 
 def ucp_unknown(id: SupportsIndex, body: SupportsGetItem[int, SupportsIndex] = ..., *, index: SupportsIndex = 0) -> bytes:
