@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -36,9 +37,10 @@ class Simulator(os.PathLike[str]):
     """A simulator; its path is that of the port, and `log` what it tells."""
 
     def __init__(self, *arguments: str) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="axle-")
-        self.path = os.path.join(self._folder.name, "port")
-        self._log = os.path.join(self._folder.name, "log")
+        self._folder = tempfile.mkdtemp(prefix="axle-")
+        self._owner = os.getpid()
+        self.path = os.path.join(self._folder, "port")
+        self._log = os.path.join(self._folder, "log")
         command = [sys.executable, "-m", "axlewire", "sim", *arguments, "--link", self.path]
         self._told: str | None = None
         with open(self._log, "wb") as log:
@@ -65,13 +67,15 @@ class Simulator(os.PathLike[str]):
             return log.read()
 
     def close(self) -> None:
-        """Ends it, as if the cable were pulled."""
+        """Ends it, as if the cable were pulled. A process that was forked does not."""
+        if os.getpid() != self._owner:
+            return
         if self._process.poll() is None:
             self._process.terminate()
             self._process.wait()
         if self._told is None:
             self._told = self.log
-            self._folder.cleanup()
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     def __del__(self) -> None:
         if hasattr(self, "_process"):

@@ -7,7 +7,7 @@ use std::{
 };
 
 use axlewire::{
-    drive::{self, DriveError},
+    drive::{self, DriveError, Operation},
     ikeya::{
         Mode, NodeId, Position, Rps,
         board::{Status, Target},
@@ -91,6 +91,14 @@ pub(crate) fn span(seconds: f64) -> PyResult<Duration> {
     }
 }
 
+/// A span between these.
+pub(crate) fn within(seconds: f64, least: f64, most: f64) -> PyResult<Duration> {
+    if (least..=most).contains(&seconds) {
+        return span(seconds);
+    }
+    Err(PyValueError::new_err(format!("{seconds} s is not from {least} to {most} s")))
+}
+
 fn id(node: u8) -> PyResult<NodeId> {
     NodeId::new(node).map_err(|error| PyKeyError::new_err(error.to_string()))
 }
@@ -128,7 +136,7 @@ impl Bus {
         let port = path.to_string_lossy().into_owned();
         let mut config = MasterConfig::usb_adapter();
         config.baud = baud;
-        config.dead_man = dead_man_s.map(span).transpose()?;
+        config.dead_man = dead_man_s.map(|it| within(it, 0.1, 3600.0)).transpose()?;
         config.polling = Polling::Every(span(period_s)?);
         if let Some(seconds) = reply_timeout_s {
             config.reply_timeout = span(seconds)?;
@@ -148,9 +156,22 @@ impl Bus {
     /// Asks all ids, and returns the nodes that answer with their modes.
     #[pyo3(signature = () -> "dict[int, str]")]
     fn discover<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = self.call(py, |driver| {
-            driver.bus.discover().map(|nodes| nodes.into_iter().collect::<Vec<_>>())
+        self.call(py, |driver| {
+            let now = driver.bus.now();
+            driver.bus.role_mut().discover(now);
+            Ok::<_, Trouble>(())
         })?;
+        // Each id is asked for so long at most; it ends by itself.
+        let longest = Instant::now() + Wait::from_secs(3600);
+        let found = self.worker.until(py, longest, |driver| {
+            let master = driver.bus.role();
+            let mode = |node: NodeId| Some((node, master.mode(node)?));
+            let is_online = |node: &NodeId| master.health(*node) == Some(Health::Online);
+            let all =
+                || NodeId::ALL.into_iter().filter(is_online).filter_map(mode).collect::<Vec<_>>();
+            (!master.is_discovering()).then(all)
+        })?;
+        let found = found.unwrap_or_default();
         let all = PyDict::new(py);
         for (node, mode) in found {
             all.set_item(node.get(), name(mode))?;
@@ -166,7 +187,7 @@ impl Bus {
     /// The ids of the nodes that are online.
     #[getter]
     fn online(&self, py: Python<'_>) -> PyResult<Vec<u16>> {
-        self.worker.call(py, |driver| {
+        self.look(py, |driver| {
             let master = driver.bus.role();
             let is_online = |node: &NodeId| {
                 matches!(master.health(*node), Some(Health::Online | Health::Suspect(_)))
@@ -175,15 +196,22 @@ impl Bus {
         })
     }
 
-    /// Stops these nodes, or all that were moved, and returns when their motors are seen to stand
+    /// Stops these nodes, or all that were heard, and returns when their motors are seen to stand
     /// still. Raises `StopsOwed` or `StillMoving` with the nodes whose motors may be moving.
     #[pyo3(signature = (*nodes: "int") -> "None")]
     fn stop(&self, py: Python<'_>, nodes: Vec<u8>) -> PyResult<()> {
         let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
         let nodes: NodeSet = nodes?.into_iter().collect();
         self.call(py, move |driver| {
-            let nodes = if nodes.is_empty() { driver.moved } else { nodes };
-            if nodes.is_empty() { Ok(()) } else { driver.bus.stop(nodes) }
+            let master = driver.bus.role();
+            // Whoever has moved it.
+            let heard = NodeId::ALL.into_iter().filter(|node| master.mode(*node).is_some());
+            let all: NodeSet = driver.moved.iter().chain(heard).collect();
+            let nodes = if nodes.is_empty() { all } else { nodes };
+            if nodes.is_empty() {
+                return Err(Trouble::refused("no node was heard yet: `discover`, or `stop_all`"));
+            }
+            driver.bus.stop(nodes).map_err(Trouble::from)
         })
     }
 
@@ -212,14 +240,14 @@ impl Bus {
 
     /// Tells the dead-man that somebody is there.
     fn keep_alive(&self, py: Python<'_>) -> PyResult<()> {
-        self.worker.call(py, alive)
+        self.look(py, |_| ())
     }
 
     /// The counts so far, as a dictionary.
     #[getter]
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let MasterStatistics { reads, writes, stale_bytes, dead_man, .. } =
-            self.worker.call(py, |driver| *driver.bus.role().statistics())?;
+            self.look(py, |driver| *driver.bus.role().statistics())?;
         let all = PyDict::new(py);
         all.set_item("reads", reads)?;
         all.set_item("writes", writes)?;
@@ -276,7 +304,10 @@ pub(crate) fn leave<D: Driven>(py: Python<'_>, worker: &Worker<D>) -> PyResult<(
     worker.dismiss();
     loop {
         match worker.left() {
-            Some(left) => return left.map_err(|trouble| trouble.raised(py)),
+            Some(left) => {
+                worker.told();
+                return left.map_err(|trouble| trouble.raised(py));
+            }
             None => py.detach(|| std::thread::sleep(SIGNALS_EVERY / 4)),
         }
         py.check_signals()?;
@@ -320,6 +351,17 @@ impl Bus {
     }
 }
 
+impl Bus {
+    /// A call that cannot fail.
+    fn look<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(&mut Driver) -> T + Send + 'static,
+    ) -> PyResult<T> {
+        self.call(py, move |driver| Ok::<_, Trouble>(job(driver)))
+    }
+}
+
 const fn name(mode: Mode) -> &'static str {
     match mode {
         Mode::Velocity => "velocity",
@@ -336,8 +378,25 @@ pub(crate) struct Node {
 
 impl Node {
     fn read(&self, py: Python<'_>) -> PyResult<Status> {
-        let id = self.id;
-        self.bus.get().call(py, move |driver| driver.bus.read(id))
+        let (id, bus) = (self.id, self.bus.get());
+        let bound = bus.call(py, move |driver| {
+            let now = driver.bus.now();
+            let master = driver.bus.role_mut();
+            master.read(id, now).map_err(|refused| Trouble::from(Failed::Bus(refused)))?;
+            Ok::<_, Trouble>(master.read_bound().saturating_mul(4))
+        })?;
+        let end = Instant::now() + Wait::from_micros(bound.as_micros().into());
+        let outcome = bus.worker.until(py, end, move |driver| {
+            let master = driver.bus.role();
+            let status = |()| master.status(id).map(|(status, _)| status);
+            Some(master.read_outcome(id)?.map(status))
+        })?;
+        let failed = match outcome {
+            Some(Ok(Some(status))) => return Ok(status),
+            Some(Err(cause)) => Failed::ReadFailed { node: id, cause },
+            Some(Ok(None)) | None => Failed::Timeout(Operation::Read { node: id }),
+        };
+        Err(Trouble::from(failed).raised(py))
     }
 }
 
@@ -398,14 +457,14 @@ impl Node {
     #[getter]
     fn mode(&self, py: Python<'_>) -> PyResult<Option<&'static str>> {
         let id = self.id;
-        self.bus.get().worker.call(py, move |driver| driver.bus.role().mode(id).map(name))
+        self.bus.get().look(py, move |driver| driver.bus.role().mode(id).map(name))
     }
 
     /// `unknown`, `online`, `suspect` or `abnormal`.
     #[getter]
     fn health(&self, py: Python<'_>) -> PyResult<&'static str> {
         let id = self.id;
-        let health = self.bus.get().worker.call(py, move |driver| driver.bus.role().health(id))?;
+        let health = self.bus.get().look(py, move |driver| driver.bus.role().health(id))?;
         Ok(match health {
             None => "unknown",
             Some(Health::Online) => "online",
@@ -420,7 +479,7 @@ impl Node {
     fn stop_progress(&self, py: Python<'_>) -> PyResult<&'static str> {
         let id = self.id;
         let progress =
-            self.bus.get().worker.call(py, move |driver| driver.bus.role().stop_progress(id))?;
+            self.bus.get().look(py, move |driver| driver.bus.role().stop_progress(id))?;
         Ok(match progress {
             StopProgress::NotAsked => "not_asked",
             StopProgress::Owed => "owed",

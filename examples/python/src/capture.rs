@@ -23,9 +23,10 @@ use axle::columns::{self, Batch, Error, Summary};
 use pyo3::{
     exceptions::{PyOSError, PyTypeError, PyUserWarning, PyValueError},
     prelude::*,
-    types::{PyByteArray, PyBytes, PyCapsule, PyDict, PyList, PyMemoryView, PyString},
+    types::{PyBytes, PyCapsule, PyDict, PyList, PyString},
 };
 
+use crate::bytes::Data;
 use crate::table::{Schemas, Table, Units, stream};
 
 /// How often a long call looks for Ctrl-C.
@@ -47,9 +48,8 @@ impl Source {
         if let Ok(bytes) = given.cast::<PyBytes>() {
             return Ok(Self::Bytes(bytes.as_bytes().to_vec()));
         }
-        if given.is_instance_of::<PyByteArray>() || given.is_instance_of::<PyMemoryView>() {
-            let bytes = given.py().get_type::<PyBytes>().call1((given,))?;
-            return Ok(Self::Bytes(bytes.cast::<PyBytes>()?.as_bytes().to_vec()));
+        if let Ok(Data(bytes)) = given.extract() {
+            return Ok(Self::Bytes(bytes));
         }
         if given.hasattr("read")? {
             return Ok(Self::File(given.clone().unbind()));

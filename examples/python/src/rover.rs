@@ -27,7 +27,7 @@ use pyo3::{
 use serde_json::Value;
 
 use crate::{
-    bus::{leave, leave_collected, not_opened, span},
+    bus::{leave, leave_collected, not_opened, span, within as between},
     bytes::python,
     capture::SIGNALS_EVERY,
     trouble::Trouble,
@@ -111,6 +111,8 @@ impl Queue {
 struct Driver {
     rover: drive::Rover,
     has_moved: bool,
+    /// Counts the commands and stops of the application: a later one takes over.
+    orders: u64,
     queues: Vec<Weak<Queue>>,
 }
 
@@ -149,7 +151,24 @@ impl Driver {
         Ok(())
     }
 
+    /// Gives a new command; returns its number.
+    fn order(&mut self, command: MotorControl) -> Result<u64, Trouble> {
+        self.command(command)?;
+        self.orders += 1;
+        Ok(self.orders)
+    }
+
+    /// Gives a command again, unless another one or a stop has taken over.
+    fn repeat(&mut self, command: MotorControl, order: u64) -> Result<(), Trouble> {
+        if self.orders == order {
+            self.command(command)
+        } else {
+            Err(Trouble::refused("another call has stopped or driven the rover meanwhile"))
+        }
+    }
+
     fn begin_stop(&mut self) {
+        self.orders += 1;
         let now = self.rover.now();
         self.rover.role_mut().stop(now);
     }
@@ -168,21 +187,6 @@ impl Driver {
                 }
                 _ if served.is_err() => thread::sleep(NAP),
                 _ => {}
-            }
-        }
-    }
-
-    fn ping(&mut self, within: Duration) -> Result<Duration, Trouble> {
-        self.rover.role_mut().take_round_trip();
-        let end = self.rover.now() + within;
-        loop {
-            let served = self.serve();
-            if let Some(trip) = self.rover.role_mut().take_round_trip() {
-                return Ok(trip);
-            }
-            served?;
-            if self.rover.now() >= end {
-                return Err(Failed::Timeout(Operation::Ping).into());
             }
         }
     }
@@ -214,11 +218,16 @@ impl Rover {
         let path: std::path::PathBuf = port.extract()?;
         let port = path.to_string_lossy().into_owned();
         let mut config = HostConfig::usb_adapter();
-        (config.baud, config.dead_man) = (baud, span(dead_man_s)?);
+        (config.baud, config.dead_man) = (baud, between(dead_man_s, 0.3, 60.0)?);
         config.low_ids_only = low_ids_only;
         let opened = py.detach(|| drive::Rover::open_with(&port, config));
         let rover = opened.map_err(|error| not_opened(&port, &error))?;
-        let worker = Arc::new(Worker::new(Driver { rover, has_moved: false, queues: Vec::new() }));
+        let worker = Arc::new(Worker::new(Driver {
+            rover,
+            has_moved: false,
+            orders: 0,
+            queues: Vec::new(),
+        }));
         let weak: Weak<dyn Leave> = Arc::downgrade(&(Arc::clone(&worker) as Arc<dyn Leave>));
         remember(weak);
         Ok(Self { worker, port })
@@ -238,7 +247,7 @@ impl Rover {
         let seconds = seconds.map(span).transpose()?;
         let command = MotorControl::new(speed, angular)
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        self.call(py, move |driver| driver.command(command))?;
+        let order = self.call(py, move |driver| driver.order(command))?;
         let Some(seconds) = seconds else { return Ok(()) };
         let end = Instant::now() + Wait::from_micros(seconds.as_micros().into());
         let driven = loop {
@@ -247,12 +256,17 @@ impl Rover {
                 break Ok(());
             }
             let waited = self.sleep(py, left.min(REPEAT));
-            if let Err(error) = waited.and_then(|()| self.repeat(py, command)) {
+            if let Err(error) = waited.and_then(|()| self.repeat(py, command, order)) {
                 break Err(error);
             }
         };
-        // At once, whatever was raised; the wait may be left by Ctrl-C.
-        let posted = self.worker.post(Driver::begin_stop);
+        // At once, whatever was raised; the wait may be left by Ctrl-C. A later order is not
+        // touched.
+        let posted = self.worker.post(move |driver| {
+            if driver.orders == order {
+                driver.begin_stop();
+            }
+        });
         driven.and(posted)?;
         self.stop(py)
     }
@@ -266,7 +280,14 @@ impl Rover {
     #[pyo3(signature = (within_s=1.0))]
     fn ping(&self, py: Python<'_>, within_s: f64) -> PyResult<f64> {
         let within = span(within_s)?;
-        let trip = self.call(py, move |driver| driver.ping(within))?;
+        self.call(py, |driver| {
+            driver.rover.role_mut().take_round_trip();
+            Ok(())
+        })?;
+        let end = Instant::now() + Wait::from_micros(within.as_micros().into());
+        let trip = self.worker.until(py, end, |it| it.rover.role_mut().take_round_trip())?;
+        let trip =
+            trip.ok_or_else(|| Trouble::from(Failed::Timeout(Operation::Ping)).raised(py))?;
         Ok(f64::from(trip.as_micros()) / 1e6)
     }
 
@@ -334,9 +355,9 @@ impl Rover {
     }
 
     /// Gives a command again, as long as the port works.
-    fn repeat(&self, py: Python<'_>, command: MotorControl) -> PyResult<()> {
+    fn repeat(&self, py: Python<'_>, command: MotorControl, order: u64) -> PyResult<()> {
         self.worker.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
-        self.call(py, move |driver| driver.command(command))
+        self.call(py, move |driver| driver.repeat(command, order))
     }
 
     fn sleep(&self, py: Python<'_>, span: Wait) -> PyResult<()> {

@@ -53,6 +53,11 @@ enum Kind {
 }
 
 impl Trouble {
+    /// A command that is not carried out, and why.
+    pub(crate) fn refused(text: &str) -> Self {
+        Self { kind: Kind::Refused, text: text.to_owned(), nodes: Vec::new() }
+    }
+
     /// These nodes are not heard any more.
     pub(crate) fn not_heard(nodes: impl Iterator<Item = NodeId>) -> Option<Self> {
         let nodes: Vec<_> = nodes.map(NodeId::get).collect();
@@ -89,6 +94,11 @@ impl Trouble {
 /// The exception of a line that was left.
 pub(crate) fn closed() -> PyErr {
     PortLost::new_err("the line is closed")
+}
+
+/// The exception of a line that another process has.
+pub(crate) fn elsewhere() -> PyErr {
+    PortLost::new_err("the line belongs to the process that opened it")
 }
 
 fn ids(nodes: NodeSet) -> Vec<u8> {

@@ -4,19 +4,21 @@
 //! whatever Python does meanwhile; and every wait can be left by Ctrl-C.
 
 use std::{
+    process,
     sync::{
         Arc, Mutex, PoisonError, Weak,
+        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel},
     },
     thread::{self, JoinHandle},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use pyo3::prelude::*;
 
 use crate::{
     capture::SIGNALS_EVERY,
-    trouble::{Trouble, closed},
+    trouble::{Trouble, closed, elsewhere},
 };
 
 /// A driver that a thread can serve.
@@ -33,13 +35,26 @@ type Job<D> = Box<dyn FnOnce(&mut D) + Send>;
 /// Time until a port that has failed is asked again.
 pub(crate) const NAP: Duration = Duration::from_millis(20);
 
+/// Time between two looks at what a thread does.
+const LOOK_EVERY: Duration = Duration::from_millis(4);
+
 /// The thread of a driver.
 pub(crate) struct Worker<D> {
     /// `None` once it is to leave.
     jobs: Mutex<Option<Sender<Job<D>>>>,
-    thread: Mutex<Option<JoinHandle<Result<(), Trouble>>>>,
+    thread: Mutex<Thread>,
+    /// Somebody was told how it has left.
+    is_told: AtomicBool,
+    /// The process that has the thread; one that was forked from it has none.
+    process: u32,
     /// Why the line could not be served the last time.
     trouble: Arc<Mutex<Option<Trouble>>>,
+}
+
+enum Thread {
+    Runs(JoinHandle<Result<(), Trouble>>),
+    /// How it has left.
+    Left(Result<(), Trouble>),
 }
 
 /// Something that is to be left before the program ends.
@@ -72,17 +87,26 @@ impl<D: Driven> Worker<D> {
         let trouble = Arc::new(Mutex::new(None));
         let told = Arc::clone(&trouble);
         let thread = thread::spawn(move || run(driver, &jobs, &told));
-        Self { jobs: Mutex::new(Some(to)), thread: Mutex::new(Some(thread)), trouble }
+        let (jobs, thread) = (Mutex::new(Some(to)), Mutex::new(Thread::Runs(thread)));
+        let is_told = AtomicBool::new(false);
+        Self { jobs, thread, is_told, process: process::id(), trouble }
     }
 
-    /// Has a job done, and waits for its result.
+    /// Has a job done, and waits for its result. If the wait is left by Ctrl-C, a job that has not
+    /// begun is not done.
     pub(crate) fn call<T: Send + 'static>(
         &self,
         py: Python<'_>,
         job: impl FnOnce(&mut D) -> T + Send + 'static,
     ) -> PyResult<T> {
         let (tell, mut told) = sync_channel(1);
-        self.post(move |driver| drop(tell.send(job(driver))))?;
+        let is_taken = Arc::new(AtomicBool::new(false));
+        let takes = Arc::clone(&is_taken);
+        self.post(move |driver| {
+            if !takes.swap(true, Ordering::SeqCst) {
+                drop(tell.send(job(driver)));
+            }
+        })?;
         loop {
             let (again, result) = py.detach(move || {
                 let result = told.recv_timeout(SIGNALS_EVERY);
@@ -91,14 +115,41 @@ impl<D: Driven> Worker<D> {
             told = again;
             match result {
                 Ok(result) => return Ok(result),
-                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Timeout) => {
+                    py.check_signals().inspect_err(|_| {
+                        is_taken.swap(true, Ordering::SeqCst);
+                    })?;
+                }
                 Err(RecvTimeoutError::Disconnected) => return Err(closed()),
             }
         }
     }
 
+    /// Has something looked at again and again, until there is a result or this time is over.
+    pub(crate) fn until<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        end: Instant,
+        look: impl FnMut(&mut D) -> Option<T> + Send + Clone + 'static,
+    ) -> PyResult<Option<T>> {
+        loop {
+            let is_last = Instant::now() >= end;
+            let mut look = look.clone();
+            let found = self.call(py, move |driver| look(driver))?;
+            if found.is_some() || is_last {
+                return Ok(found);
+            }
+            self.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
+            py.detach(|| thread::sleep(LOOK_EVERY));
+            py.check_signals()?;
+        }
+    }
+
     /// Has a job done, and does not wait.
     pub(crate) fn post(&self, job: impl FnOnce(&mut D) + Send + 'static) -> PyResult<()> {
+        if self.is_elsewhere() {
+            return Err(elsewhere());
+        }
         let jobs = self.jobs.lock().unwrap_or_else(PoisonError::into_inner);
         let sent = jobs.as_ref().is_some_and(|jobs| jobs.send(Box::new(job)).is_ok());
         if sent { Ok(()) } else { Err(closed()) }
@@ -111,25 +162,53 @@ impl<D: Driven> Worker<D> {
 
     /// Tells the thread to leave, without waiting.
     pub(crate) fn dismiss(&self) {
+        if self.is_elsewhere() {
+            return;
+        }
         *self.jobs.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Whether the thread has left; then, once, how.
+    /// Whether the thread has left, and how.
     pub(crate) fn left(&self) -> Option<Result<(), Trouble>> {
-        let mut thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*thread {
-            None => Some(Ok(())),
-            Some(running) if !running.is_finished() => None,
-            Some(_) => thread.take().map(ended),
+        if self.is_elsewhere() {
+            return Some(Ok(()));
         }
+        let mut thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        if matches!(&*thread, Thread::Runs(running) if !running.is_finished()) {
+            return None;
+        }
+        let result = match std::mem::replace(&mut *thread, Thread::Left(Ok(()))) {
+            Thread::Runs(running) => ended(running),
+            Thread::Left(result) => result,
+        };
+        *thread = Thread::Left(result.clone());
+        Some(result)
+    }
+
+    /// The exception that tells has been raised.
+    pub(crate) fn told(&self) {
+        self.is_told.store(true, Ordering::SeqCst);
+    }
+
+    fn is_elsewhere(&self) -> bool {
+        self.process != process::id()
     }
 }
 
 impl<D: Driven> Leave for Worker<D> {
     fn leave(&self) -> Result<(), Trouble> {
+        if self.is_elsewhere() {
+            return Ok(());
+        }
         self.dismiss();
-        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
-        thread.map_or(Ok(()), ended)
+        loop {
+            match self.left() {
+                // Once is enough.
+                Some(_) if self.is_told.load(Ordering::SeqCst) => return Ok(()),
+                Some(left) => return left,
+                None => thread::sleep(LOOK_EVERY),
+            }
+        }
     }
 }
 

@@ -318,3 +318,79 @@ def test_a_closed_line_can_be_closed_again_and_not_be_used(port, field):
     for kind in (Bus, Rover):
         with pytest.raises(OSError, match="/dev/none"):
             kind("/dev/none")
+
+
+def test_a_stop_is_for_whatever_turns_also_by_a_program_that_was_killed(port):
+    process = child("it = bus(); turn(it); os._exit(0)", port)
+    process.communicate(timeout=30)
+    with Bus(port) as other:
+        other.discover()
+        assert other[1].velocity > 1
+        other.stop()
+        assert abs(other[1].velocity) < 0.05
+    with Bus(port) as unheard, pytest.raises(Refused, match="discover"):
+        unheard.stop()
+
+
+def test_a_stop_takes_over_from_a_drive_of_another_thread(field):
+    with Rover(field) as rover, ThreadPoolExecutor(1) as threads:
+        driving = threads.submit(rover.drive, 60, 0, seconds=30)
+        time.sleep(0.5)
+        rover.stop()
+        time.sleep(0.5)
+        assert max(map(abs, rover.report.rpm)) <= 2
+        with pytest.raises(Refused, match="another call"):
+            driving.result(timeout=5)
+
+
+def test_a_close_that_failed_fails_again(port):
+    bus = turning(port)
+    port.close()
+    for _ in range(2):
+        with pytest.raises((StopsOwed, StillMoving)) as raised:
+            bus.close()
+        assert raised.value.nodes == [1]
+
+
+def test_each_of_several_closes_waits_and_tells_the_same(port):
+    bus = turning(port)
+    port.close()
+    with ThreadPoolExecutor(3) as threads:
+        closing = [threads.submit(bus.close) for _ in range(3)]
+        assert all(isinstance(it.exception(30), (StopsOwed, StillMoving)) for it in closing)
+
+
+def test_a_forked_process_has_no_line(port):
+    code = """it = bus(); turn(it)
+if os.fork() == 0:
+    try: it.online
+    except axlewire.PortLost as error: print(error, flush=True)
+    it.close()
+    del it
+    sys.exit(0)
+os.wait(); time.sleep(0.1); print(it[1].velocity > 1)"""
+    out, err = child(code, port).communicate(timeout=30)
+    assert out == "the line belongs to the process that opened it\nTrue\n", err
+    assert told(port, "node 1: at rest")
+
+
+def test_what_was_asked_for_behind_a_ctrl_c_is_not_done(port):
+    code = """it = bus(); it.discover()
+t = threading.Thread(target=lambda: it.stop(5), daemon=True); t.start(); time.sleep(0.1)
+print("begins", flush=True)
+try: it[1].velocity = 2.0
+except KeyboardInterrupt: pass
+time.sleep(3); print(it[1].velocity)"""
+    process = child(code, port)
+    assert process.stdout.readline() == "begins\n"
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=40)
+    assert float(out) == 0 and "command 2.00 rps" not in port.log, err
+
+
+def test_the_dead_man_that_has_fired_is_told(port):
+    with turning(port, dead_man_s=0.3) as bus:
+        time.sleep(0.8)
+        with pytest.warns(UserWarning, match="dead-man"):
+            bus.online
