@@ -54,7 +54,7 @@ class Bus:
         """
     def stop(self, /, *nodes: "int") -> "None":
         """
-        Stops these nodes, or all that were moved, and returns when their motors are seen to stand
+        Stops these nodes, or all that were heard, and returns when their motors are seen to stand
         still. Raises `StopsOwed` or `StillMoving` with the nodes whose motors may be moving.
         """
     def stop_all(self, /) -> None:
