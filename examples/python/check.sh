@@ -2,7 +2,7 @@
 # Runs the proof of this package, in an environment of its own: some ten minutes the first time.
 #
 #   examples/python/check.sh           all of it
-#   examples/python/check.sh --quick   without engines, notebook, wheel and sanitizers
+#   examples/python/check.sh --quick   only the tests without engines
 #
 # Needs Rust, Python 3.11 or later with venv, and Java for Spark; for the sanitizers also a nightly
 # compiler and clang.
@@ -13,22 +13,24 @@ python=$target/python/bin/python
 [ -x "$python" ] || python3 -m venv "$target/python"
 export PATH=$target/python/bin:$PATH CARGO_TARGET_DIR=$target/wheel
 unset VIRTUAL_ENV
-"$python" -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
+pip=("$python" -m pip install --quiet --disable-pip-version-check)
+"${pip[@]}" -r tests/requirements.txt
 export VIRTUAL_ENV=$target/python
 
+maturin develop --quiet --release
+if [ "${1-}" = --quick ]; then
+    exec "$python" -m pytest -q tests/test_bytes.py tests/test_capture.py tests/test_live.py
+fi
+
 echo "== lints and types"
+"${pip[@]}" -r tests/engines.txt
 cargo fmt --check
 cargo clippy --quiet -- -D warnings
-maturin develop --quiet --release
 ./stubs.sh --check
 mypy --strict axlewire tests/typed_program.py
 pyright --pythonpath "$python" axlewire tests/typed_program.py
 
 echo "== tests"
-if [ "${1-}" = --quick ]; then
-    exec "$python" -m pytest -q tests/test_bytes.py tests/test_capture.py tests/test_live.py
-fi
-"$python" -m pip install --quiet --disable-pip-version-check -r tests/engines.txt
 "$python" -m pytest -q tests
 
 echo "== the notebook"

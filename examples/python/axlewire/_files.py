@@ -127,7 +127,7 @@ def rows(file: str, of: Wanted, tell: Callable[[str], None] = _warn) -> pa.Table
         return of.schema.empty_table()
     cut = capture.summary["cut"]
     if isinstance(cut, str):
-        tell(cut.replace('"standard input"', f'"{file}"'))
+        tell(cut.replace("the capture", f'"{file}"', 1))
     table = pa.table(capture[of.table])
     columns = {name: table[name] for name in table.column_names}
     columns["path"] = pa.repeat(pa.scalar(file, pa.string()), table.num_rows)
