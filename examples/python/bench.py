@@ -8,6 +8,7 @@ The captures are made of the reports of ../captures/drive.pcapng, as raw bytes. 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import struct
 import subprocess
 import sys
@@ -82,6 +83,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder, "reports.bin"))
         Path(path).write_bytes(data)
+        os.sync()  # else the disk is written meanwhile
         speed = len(data) / fastest(lambda: axlewire.read(path, protocol="ucp"))
         nothing = lambda: list(axlewire.scan(path, protocol="ucp", message="skipped"))  # noqa: E731
         decoding = len(data) / fastest(nothing)

@@ -14,7 +14,7 @@ use std::{
         mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel},
     },
     thread::{self, JoinHandle},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use arrow_array::{RecordBatch, RecordBatchReader};
@@ -62,6 +62,15 @@ impl Source {
             Err(_) => Err(PyTypeError::new_err(
                 "a capture is a path, a list of paths, bytes, or a file open for reading bytes",
             )),
+        }
+    }
+
+    /// Whether reading it may wait for somebody, as for the other end of a pipe. A file of Python
+    /// hears of signals itself.
+    fn may_wait(&self) -> bool {
+        match self {
+            Self::Paths(paths) => !paths.iter().all(|path| path.is_file() || path.is_dir()),
+            Self::Bytes(_) | Self::File(_) => false,
         }
     }
 
@@ -163,24 +172,22 @@ pub(crate) fn read(
 ) -> PyResult<Capture> {
     let (units, given, source) =
         (Units::named(units)?, source.clone().unbind(), Source::of(source)?);
-    let (named, raised, is_over) = (protocol.clone(), Raised::default(), Arc::default());
-    let (theirs, ends): (_, Arc<AtomicBool>) = (Arc::clone(&raised), Arc::clone(&is_over));
-    let (tell, mut told) = sync_channel(1);
-    // In a thread, so that Ctrl-C ends the call whatever the reading waits for.
-    thread::spawn(move || drop(tell.send(whole(source, named.as_deref(), units, theirs, &ends))));
-    let read = loop {
-        let (again, result) = py.detach(move || {
-            let result = told.recv_timeout(SIGNALS_EVERY);
-            (told, result)
-        });
-        told = again;
-        match result {
-            Ok(read) => break read,
-            Err(RecvTimeoutError::Timeout) => {
-                py.check_signals().inspect_err(|_| is_over.store(true, Ordering::Relaxed))?;
+    let raised = Raised::default();
+    let read = if source.may_wait() {
+        in_a_thread(py, source, protocol.clone(), units, &raised)?
+    } else {
+        let mut next_look = Instant::now();
+        let go_on = || {
+            if Instant::now() < next_look {
+                return Ok(());
             }
-            Err(RecvTimeoutError::Disconnected) => break Err(Error::Stopped),
-        }
+            next_look = Instant::now() + SIGNALS_EVERY;
+            Python::attach(|py| py.check_signals()).map_err(|signal| {
+                *raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(signal);
+                Error::Stopped
+            })
+        };
+        py.detach(|| whole(source, protocol.as_deref(), units, Arc::clone(&raised), go_on))
     };
     check_raised(&raised)?;
     let Whole { tables, numbers, schemas, summary } = read.map_err(self::raised)?;
@@ -188,6 +195,38 @@ pub(crate) fn read(
         warn(py, cut)?;
     }
     Ok(Capture { tables, numbers, schemas, summary, source: given, protocol })
+}
+
+/// Reads in a thread, so that Ctrl-C ends the call although the reading waits. Without need it is
+/// not done: the allocator of Linux gives a thread memory of its own, which is slower.
+fn in_a_thread(
+    py: Python<'_>,
+    source: Source,
+    protocol: Option<String>,
+    units: Units,
+    raised: &Raised,
+) -> PyResult<Result<Whole, Error>> {
+    let (raised, is_over) = (Arc::clone(raised), Arc::new(AtomicBool::new(false)));
+    let ends = Arc::clone(&is_over);
+    let go_on = move || if ends.load(Ordering::Relaxed) { Err(Error::Stopped) } else { Ok(()) };
+    let (tell, mut told) = sync_channel(1);
+    thread::spawn(move || {
+        drop(tell.send(whole(source, protocol.as_deref(), units, raised, go_on)));
+    });
+    loop {
+        let (again, result) = py.detach(move || {
+            let result = told.recv_timeout(SIGNALS_EVERY);
+            (told, result)
+        });
+        told = again;
+        match result {
+            Ok(read) => return Ok(read),
+            Err(RecvTimeoutError::Timeout) => {
+                py.check_signals().inspect_err(|_| is_over.store(true, Ordering::Relaxed))?;
+            }
+            Err(RecvTimeoutError::Disconnected) => return Ok(Err(Error::Stopped)),
+        }
+    }
 }
 
 /// What was read.
@@ -204,7 +243,7 @@ fn whole(
     protocol: Option<&str>,
     units: Units,
     raised: Raised,
-    is_over: &AtomicBool,
+    go_on: impl FnMut() -> Result<(), Error>,
 ) -> Result<Whole, Error> {
     // The allocator of Linux gives each column a mapping of its own, which takes longer than to
     // fill it, until a block of this size was freed once.
@@ -220,7 +259,7 @@ fn whole(
             tables.entry(table).or_default().push(schemas.batch(batch));
             Ok(())
         },
-        || if is_over.load(Ordering::Relaxed) { Err(Error::Stopped) } else { Ok(()) },
+        go_on,
     )?;
     let tables = tables.into_iter().map(|(name, all)| (name, Arc::new(all))).collect();
     Ok(Whole { tables, numbers, schemas, summary })
