@@ -61,7 +61,7 @@ class Bus:
         """
         Stops every node that may be on this bus, heard or not. Those that were never heard cannot
         confirm it, so `StopsOwed` is raised for them: say with `Bus(..., nodes=[1, 2])` which ids
-        there are. `stop()` is for the nodes that you have moved.
+        there are. `stop()` stops those that were heard.
         """
     def wait(self, /, seconds: SupportsFloat | SupportsIndex) -> None:
         """

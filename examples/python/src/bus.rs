@@ -156,10 +156,9 @@ impl Bus {
     /// Asks all ids, and returns the nodes that answer with their modes.
     #[pyo3(signature = () -> "dict[int, str]")]
     fn discover<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.call(py, |driver| {
+        self.look(py, |driver| {
             let now = driver.bus.now();
             driver.bus.role_mut().discover(now);
-            Ok::<_, Trouble>(())
         })?;
         // Each id is asked for so long at most; it ends by itself.
         let longest = Instant::now() + Wait::from_secs(3600);
@@ -217,7 +216,7 @@ impl Bus {
 
     /// Stops every node that may be on this bus, heard or not. Those that were never heard cannot
     /// confirm it, so `StopsOwed` is raised for them: say with `Bus(..., nodes=[1, 2])` which ids
-    /// there are. `stop()` is for the nodes that you have moved.
+    /// there are. `stop()` stops those that were heard.
     fn stop_all(&self, py: Python<'_>) -> PyResult<()> {
         self.call(py, |driver| driver.bus.stop_all())
     }
@@ -349,9 +348,7 @@ impl Bus {
         }
         result.map_err(|trouble| trouble.raised(py))
     }
-}
 
-impl Bus {
     /// A call that cannot fail.
     fn look<T: Send + 'static>(
         &self,

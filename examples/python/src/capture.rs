@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     ffi::CString,
-    hint::black_box,
     io::{self, Cursor, Read},
     mem::take,
     ops::Range,
@@ -26,8 +25,11 @@ use pyo3::{
     types::{PyBytes, PyCapsule, PyDict, PyList, PyString},
 };
 
-use crate::bytes::Data;
-use crate::table::{Schemas, Table, Units, stream};
+use crate::{
+    bytes::Data,
+    table::{Schemas, Table, Units, stream},
+    worker::received,
+};
 
 /// How often a long call looks for Ctrl-C.
 pub(crate) const SIGNALS_EVERY: Duration = Duration::from_millis(20);
@@ -197,8 +199,7 @@ pub(crate) fn read(
     Ok(Capture { tables, numbers, schemas, summary, source: given, protocol })
 }
 
-/// Reads in a thread, so that Ctrl-C ends the call although the reading waits. Without need it is
-/// not done: the allocator of Linux gives a thread memory of its own, which is slower.
+/// Reads in a thread, so that Ctrl-C ends the call although the reading waits.
 fn in_a_thread(
     py: Python<'_>,
     source: Source,
@@ -209,24 +210,12 @@ fn in_a_thread(
     let (raised, is_over) = (Arc::clone(raised), Arc::new(AtomicBool::new(false)));
     let ends = Arc::clone(&is_over);
     let go_on = move || if ends.load(Ordering::Relaxed) { Err(Error::Stopped) } else { Ok(()) };
-    let (tell, mut told) = sync_channel(1);
+    let (tell, told) = sync_channel(1);
     thread::spawn(move || {
         drop(tell.send(whole(source, protocol.as_deref(), units, raised, go_on)));
     });
-    loop {
-        let (again, result) = py.detach(move || {
-            let result = told.recv_timeout(SIGNALS_EVERY);
-            (told, result)
-        });
-        told = again;
-        match result {
-            Ok(read) => return Ok(read),
-            Err(RecvTimeoutError::Timeout) => {
-                py.check_signals().inspect_err(|_| is_over.store(true, Ordering::Relaxed))?;
-            }
-            Err(RecvTimeoutError::Disconnected) => return Ok(Err(Error::Stopped)),
-        }
-    }
+    let read = received(py, told).inspect_err(|_| is_over.store(true, Ordering::Relaxed))?;
+    Ok(read.unwrap_or(Err(Error::Stopped)))
 }
 
 /// What was read.
@@ -245,9 +234,6 @@ fn whole(
     raised: Raised,
     go_on: impl FnMut() -> Result<(), Error>,
 ) -> Result<Whole, Error> {
-    // The allocator of Linux gives each column a mapping of its own, which takes longer than to
-    // fill it, until a block of this size was freed once.
-    drop(black_box(Vec::<u8>::with_capacity(16 << 20)));
     let capture = source.open(protocol, raised)?;
     let schemas = Schemas::new(&capture.empty(), units);
     let mut tables = BTreeMap::<String, Vec<_>>::new();
@@ -420,26 +406,15 @@ pub(crate) fn scan(
 ) -> PyResult<Scan> {
     let (units, source) = (Units::named(units)?, Source::of(source)?);
     let (to, batches) = sync_channel(AHEAD);
-    let (say, mut said) = sync_channel(1);
+    let (say, said) = sync_channel(1);
     let (named, raised) = (protocol.clone(), Raised::default());
     let theirs = Arc::clone(&raised);
     let reader = thread::spawn(move || run(source, protocol.as_deref(), theirs, &say, &to));
     let mut reading = Reading { batches: Some(batches), reader: Some(reader) };
-    let empty = loop {
-        let (again, result) = py.detach(move || {
-            let result = said.recv_timeout(SIGNALS_EVERY);
-            (said, result)
-        });
-        said = again;
-        match result {
-            Ok(empty) => break empty,
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => {
-                let ended = py.detach(|| reading.end());
-                check_raised(&raised)?;
-                return Err(self::raised(ended.err().unwrap_or(Error::Stopped)));
-            }
-        }
+    let Some(empty) = received(py, said)? else {
+        let ended = py.detach(|| reading.end());
+        check_raised(&raised)?;
+        return Err(self::raised(ended.err().unwrap_or(Error::Stopped)));
     };
     let schemas = Schemas::new(&empty, units);
     let message = message.map(|message| schemas.only(message, named.as_deref())).transpose()?;

@@ -38,6 +38,23 @@ pub(crate) const NAP: Duration = Duration::from_millis(20);
 /// Time between two looks at what a thread does.
 const LOOK_EVERY: Duration = Duration::from_millis(4);
 
+/// Waits for what another thread sends; `None` if it has ended without. Ctrl-C ends the wait.
+pub(crate) fn received<T: Send>(py: Python<'_>, from: Receiver<T>) -> PyResult<Option<T>> {
+    let mut from = from;
+    loop {
+        let (again, result) = py.detach(move || {
+            let result = from.recv_timeout(SIGNALS_EVERY);
+            (from, result)
+        });
+        from = again;
+        match result {
+            Ok(sent) => return Ok(Some(sent)),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
 /// The thread of a driver.
 pub(crate) struct Worker<D> {
     /// `None` once it is to leave.
@@ -99,7 +116,7 @@ impl<D: Driven> Worker<D> {
         py: Python<'_>,
         job: impl FnOnce(&mut D) -> T + Send + 'static,
     ) -> PyResult<T> {
-        let (tell, mut told) = sync_channel(1);
+        let (tell, told) = sync_channel(1);
         let is_taken = Arc::new(AtomicBool::new(false));
         let takes = Arc::clone(&is_taken);
         self.post(move |driver| {
@@ -107,22 +124,8 @@ impl<D: Driven> Worker<D> {
                 drop(tell.send(job(driver)));
             }
         })?;
-        loop {
-            let (again, result) = py.detach(move || {
-                let result = told.recv_timeout(SIGNALS_EVERY);
-                (told, result)
-            });
-            told = again;
-            match result {
-                Ok(result) => return Ok(result),
-                Err(RecvTimeoutError::Timeout) => {
-                    py.check_signals().inspect_err(|_| {
-                        is_taken.swap(true, Ordering::SeqCst);
-                    })?;
-                }
-                Err(RecvTimeoutError::Disconnected) => return Err(closed()),
-            }
-        }
+        let result = received(py, told).inspect_err(|_| is_taken.store(true, Ordering::SeqCst))?;
+        result.ok_or_else(closed)
     }
 
     /// Has something looked at again and again, until there is a result or this time is over.
