@@ -53,7 +53,7 @@ assert len(capture["report"]) == 849, capture
 
 echo "== the address sanitizer"
 RUSTFLAGS=-Zsanitizer=address cargo +nightly build --quiet --target x86_64-unknown-linux-gnu \
-    --target-dir "$target/asan"
+    --no-default-features --features abi3 --target-dir "$target/asan"
 cp -r axlewire "$fresh/axlewire"
 cp "$target/asan/x86_64-unknown-linux-gnu/debug/libaxlewire_python.so" \
     "$fresh/axlewire/_axlewire.abi3.so"

@@ -8,7 +8,7 @@ mod described;
 mod hot;
 mod row;
 
-use std::{collections::BTreeMap, mem, rc::Rc};
+use std::{collections::BTreeMap, mem, ptr, rc::Rc};
 
 use axlewire::fields::Shape;
 
@@ -92,8 +92,9 @@ pub(crate) struct Tables {
     days: BTreeMap<Rc<str>, u64>,
     /// The first of each protocol.
     first: [usize; 3],
-    /// The table of the last frame: the next is often of the same message.
+    /// The table of the last frame, and its message: the next is often of the same.
     last: usize,
+    last_message: (Protocol, &'static str),
     has_times: bool,
     /// Frames and gaps so far.
     count: u64,
@@ -123,7 +124,8 @@ impl Tables {
             line: Rc::default(),
             days: BTreeMap::new(),
             first,
-            last: 0,
+            last: usize::MAX,
+            last_message: (Protocol::Ucp, ""),
             has_times,
             count: 0,
             held: 0,
@@ -165,12 +167,14 @@ impl Tables {
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
         self.turn_to_day(at.micros);
-        let name = frame.name();
-        let is_its = |table: &Table| (table.protocol, table.message) == (Some(S::PROTOCOL), name);
-        if !self.all.get(self.last).is_some_and(is_its) {
+        let (name, (last_protocol, last_name)) = (frame.name(), self.last_message);
+        // By its place in memory: texts in different places are searched for.
+        if last_protocol != S::PROTOCOL || !ptr::eq(last_name, name) {
+            let is_its = |it: &Table| (it.protocol, it.message) == (Some(S::PROTOCOL), name);
             let first = self.first.get(S::PROTOCOL as usize).copied().unwrap_or_default();
             let its = self.all.iter().skip(first).position(is_its);
             self.last = its.map_or(usize::MAX, |at| first + at);
+            self.last_message = (S::PROTOCOL, name);
         }
         let mode = frame.commands().and_then(|node| modes.of(node));
         let added = self.add(self.last, at, |table| {

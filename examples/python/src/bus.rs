@@ -26,7 +26,7 @@ use pyo3::{
 use crate::{
     capture::{SIGNALS_EVERY, warn},
     trouble::Trouble,
-    worker::{Driven, Leave, Worker, remember},
+    worker::{Driven, Leave, Worker, remember, sleep_until},
 };
 
 /// A moment in which the line is served between two jobs.
@@ -228,12 +228,10 @@ impl Bus {
         loop {
             self.call(py, |driver| driver.hears_all())?;
             self.worker.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
+            if Instant::now() >= end {
                 return Ok(());
             }
-            py.detach(|| std::thread::sleep(left.min(SIGNALS_EVERY)));
-            py.check_signals()?;
+            sleep_until(py, end.min(Instant::now() + SIGNALS_EVERY))?;
         }
     }
 

@@ -13,6 +13,10 @@ use std::{ffi::OsString, process::ExitCode};
 
 use pyo3::prelude::*;
 
+#[cfg(feature = "mimalloc")]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// CRC-16 of both protocols (ruling B1).
 #[pyfunction]
 #[pyo3(signature = (data: "Buffer"))]

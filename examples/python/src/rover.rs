@@ -31,7 +31,7 @@ use crate::{
     bytes::python,
     capture::SIGNALS_EVERY,
     trouble::Trouble,
-    worker::{Driven, Leave, NAP, Worker, remember},
+    worker::{Driven, Leave, NAP, Worker, remember, sleep_until},
 };
 
 /// A moment in which the line is served between two jobs.
@@ -251,11 +251,10 @@ impl Rover {
         let Some(seconds) = seconds else { return Ok(()) };
         let end = Instant::now() + Wait::from_micros(seconds.as_micros().into());
         let driven = loop {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
+            if Instant::now() >= end {
                 break Ok(());
             }
-            let waited = self.sleep(py, left.min(REPEAT));
+            let waited = sleep_until(py, end.min(Instant::now() + REPEAT));
             if let Err(error) = waited.and_then(|()| self.repeat(py, command, order)) {
                 break Err(error);
             }
@@ -358,18 +357,6 @@ impl Rover {
     fn repeat(&self, py: Python<'_>, command: MotorControl, order: u64) -> PyResult<()> {
         self.worker.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
         self.call(py, move |driver| driver.repeat(command, order))
-    }
-
-    fn sleep(&self, py: Python<'_>, span: Wait) -> PyResult<()> {
-        let end = Instant::now() + span;
-        loop {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Ok(());
-            }
-            py.detach(|| thread::sleep(left.min(SIGNALS_EVERY)));
-            py.check_signals()?;
-        }
     }
 }
 

@@ -55,6 +55,18 @@ pub(crate) fn received<T: Send>(py: Python<'_>, from: Receiver<T>) -> PyResult<O
     }
 }
 
+/// Sleeps. Ctrl-C ends it.
+pub(crate) fn sleep_until(py: Python<'_>, end: Instant) -> PyResult<()> {
+    loop {
+        let left = end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(());
+        }
+        py.detach(|| thread::sleep(left.min(SIGNALS_EVERY)));
+        py.check_signals()?;
+    }
+}
+
 /// The thread of a driver.
 pub(crate) struct Worker<D> {
     /// `None` once it is to leave.
@@ -143,8 +155,7 @@ impl<D: Driven> Worker<D> {
                 return Ok(found);
             }
             self.trouble().map_or(Ok(()), |trouble| Err(trouble.raised(py)))?;
-            py.detach(|| thread::sleep(LOOK_EVERY));
-            py.check_signals()?;
+            sleep_until(py, Instant::now() + LOOK_EVERY)?;
         }
     }
 
