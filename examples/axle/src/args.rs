@@ -82,6 +82,11 @@ impl Protocol {
         }
     }
 
+    /// The protocol of this name.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        [Self::Ucp, Self::Ikeya, Self::Ikeya3].into_iter().find(|it| it.name() == name)
+    }
+
     /// Default speed of its lines, bit/s.
     pub(crate) const fn default_baud(self) -> u32 {
         match self {

@@ -3,6 +3,7 @@
 //! Made for the wheel of `examples/python`. It changes with the tool, without notice.
 
 use std::{
+    fmt,
     io::Read,
     ops::Range,
     path::{Path, PathBuf},
@@ -15,9 +16,11 @@ pub use crate::tables::{Column, Values};
 use crate::{
     args::Protocol,
     captures,
-    decode::{self, Chosen},
+    decode::{self, Chosen, Sheet, Walked},
     failure::Failure,
     input::{Form, Input},
+    kept::Kept,
+    rows::Rows,
     tables::{Sink, Table, Tables},
 };
 
@@ -32,6 +35,15 @@ pub enum Error {
     Argument(String),
     /// The reader has had enough.
     Stopped,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(line, _) | Self::Capture(line) | Self::Argument(line) => f.write_str(line),
+            Self::Stopped => f.write_str("reading was stopped"),
+        }
+    }
 }
 
 impl From<Failure> for Error {
@@ -68,6 +80,8 @@ pub struct Summary {
     pub times_back: u64,
     /// Why the capture could not be read to its end, if so; what comes before that was read.
     pub cut: Option<String>,
+    /// What else is to be told: impossible times, and further captures that could not be read.
+    pub notes: Vec<String>,
 }
 
 /// A capture.
@@ -103,7 +117,7 @@ impl Capture {
     }
 
     fn new(mut input: Input, protocol: Option<Protocol>) -> Result<Self, Error> {
-        input.hide_progress();
+        input.be_quiet();
         let chosen = decode::choose(&mut input, protocol)?;
         Ok(Self { input, chosen })
     }
@@ -137,10 +151,47 @@ impl Capture {
         if let Ok(Some(error)) = theirs.into_inner() {
             return Err(error);
         }
-        let walked = walked?;
+        Ok(Summary::of(walked?))
+    }
+}
+
+impl Capture {
+    /// Reads it as rows that stay in memory. `go_on` is asked at least once for every 16 KB.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read), and if there is not enough memory.
+    pub fn keep(
+        mut self,
+        mut go_on: impl FnMut() -> Result<(), Error>,
+    ) -> Result<(Rows, Summary), Error> {
+        let (mut sheet, mut theirs) = (Sheet::new(None), None);
+        sheet.kept = Some(Kept::default());
+        let walked = self.chosen.walk(&mut self.input, &mut sheet, |_, sheet| {
+            let kept = sheet.kept.as_ref();
+            if let Some(full) = kept.filter(|kept| kept.is_full) {
+                let line = format!("no memory for more than {} frames and gaps", full.len());
+                return Err(Failure::Failed(line));
+            }
+            go_on().map_err(|error| {
+                theirs = Some(error);
+                Failure::Failed(String::new())
+            })
+        });
+        if let Some(error) = theirs {
+            return Err(error);
+        }
+        let rows = Rows::new(sheet.kept.unwrap_or_default(), self.chosen.has_times);
+        Ok((rows, Summary::of(walked?)))
+    }
+}
+
+impl Summary {
+    fn of(mut walked: Walked) -> Self {
         let (account, times_back) = (walked.account, walked.times_back);
+        let notes = walked.notes.take().unwrap_or_default();
         let cut = walked.missing().err().map(|failure| told(&failure));
-        Ok(Summary { account, times_back, cut })
+        Self { account, times_back, cut, notes }
     }
 }
 
@@ -151,10 +202,8 @@ fn told(failure: &Failure) -> String {
 }
 
 fn named(protocol: Option<&str>) -> Result<Option<Protocol>, Error> {
-    let all = [Protocol::Ucp, Protocol::Ikeya, Protocol::Ikeya3];
     let Some(name) = protocol else { return Ok(None) };
-    let known = all.into_iter().find(|protocol| protocol.name() == name);
-    known.map(Some).ok_or_else(|| {
+    Protocol::named(name).map(Some).ok_or_else(|| {
         Error::Argument(format!("protocol {name:?} is none of 'ucp', 'ikeya', 'ikeya-3'"))
     })
 }

@@ -9,6 +9,7 @@ use std::{
 };
 
 use flate2::read::MultiGzDecoder;
+#[cfg(not(target_family = "wasm"))]
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use crate::{
@@ -49,6 +50,9 @@ pub(crate) struct Form {
     hex: bool,
 }
 
+/// Is told of each read how many bytes it gave.
+type Progress = Box<dyn Fn(u64)>;
+
 /// A byte source of any length that holds one chunk in memory.
 pub(crate) struct Input {
     path: Option<PathBuf>,
@@ -65,7 +69,8 @@ pub(crate) struct Input {
     file: Option<(File, u64)>,
     /// It is read as it is, neither packed nor text.
     is_plain: bool,
-    progress: Option<ProgressBar>,
+    progress: Option<Progress>,
+    is_quiet: bool,
     form: Form,
     /// The files behind this one, and all of them.
     rest: VecDeque<PathBuf>,
@@ -116,8 +121,8 @@ impl Input {
         let Some(path) = self.rest.pop_front() else { return Ok(false) };
         let next = Self::open_one(Some(&path), self.form)?;
         let (rest, all) = (mem::take(&mut self.rest), mem::take(&mut self.all));
-        let root = self.root.take();
-        *self = Self { rest, all, root, file: None, progress: None, ..next };
+        let (root, is_quiet) = (self.root.take(), self.is_quiet);
+        *self = Self { rest, all, root, is_quiet, file: None, progress: None, ..next };
         Ok(true)
     }
 
@@ -143,16 +148,21 @@ impl Input {
         Self::new(None, reader, None, None).unpack(Form::default())
     }
 
-    /// Shows no progress.
-    pub(crate) fn hide_progress(&mut self) {
-        self.progress = None;
+    /// Nothing is told on standard error.
+    pub(crate) fn be_quiet(&mut self) {
+        (self.is_quiet, self.progress) = (true, None);
+    }
+
+    /// Whether nothing is told on standard error.
+    pub(crate) const fn is_quiet(&self) -> bool {
+        self.is_quiet
     }
 
     fn new(
         path: Option<PathBuf>,
         reader: Box<dyn Read>,
         file: Option<(File, u64)>,
-        progress: Option<ProgressBar>,
+        progress: Option<Progress>,
     ) -> Self {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let (ahead, first) = (Vec::new(), Vec::new());
@@ -169,6 +179,7 @@ impl Input {
             file,
             is_plain,
             progress,
+            is_quiet: false,
             form,
             rest,
             all,
@@ -319,7 +330,7 @@ impl Input {
             }
         };
         if let Some(progress) = &self.progress {
-            progress.inc(read as u64);
+            progress(read as u64);
         }
         self.keep(read);
         Ok(self.chunk.get(..read).unwrap_or_default())
@@ -351,7 +362,7 @@ impl Input {
         let missing = self.first_len - self.first.len();
         self.first.extend(bytes.iter().skip(begin).take(missing));
         if let Some(progress) = &self.progress {
-            progress.inc((held - begin) as u64);
+            progress((held - begin) as u64);
         }
         is_over
     }
@@ -375,7 +386,7 @@ impl Read for &mut Input {
         }
         let count = reader.read(buffer)?;
         if let Some(progress) = progress {
-            progress.inc(count as u64);
+            progress(count as u64);
         }
         Ok(count)
     }
@@ -395,14 +406,22 @@ pub(crate) const fn is_telnet(front: &[u8]) -> bool {
 }
 
 /// A bar on standard error, if that is a terminal and the listing does not go to the terminal too.
-fn progress(len: u64) -> Option<ProgressBar> {
+#[cfg(not(target_family = "wasm"))]
+fn progress(len: u64) -> Option<Progress> {
     if len <= NO_PROGRESS_UP_TO || !io::stderr().is_terminal() || io::stdout().is_terminal() {
         return None;
     }
     // The bar takes what the texts leave of the width of the terminal, so that no line wraps.
     let style = ProgressStyle::with_template("{bytes} of {total_bytes} [{wide_bar}] {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    Some(ProgressBar::new(len).with_style(style).with_finish(ProgressFinish::AndClear))
+    let bar = ProgressBar::new(len).with_style(style).with_finish(ProgressFinish::AndClear);
+    Some(Box::new(move |read| bar.inc(read)))
+}
+
+/// A page shows its own.
+#[cfg(target_family = "wasm")]
+fn progress(_: u64) -> Option<Progress> {
+    None
 }
 
 #[cfg(test)]
@@ -427,7 +446,7 @@ mod tests {
         }
     }
 
-    fn rough(rest: &'static [u8], progress: Option<ProgressBar>) -> Input {
+    fn rough(rest: &'static [u8], progress: Option<Progress>) -> Input {
         let reader = Rough { rest, is_interrupted: false };
         Input::new(None, Box::new(reader), None, progress)
     }
@@ -449,7 +468,9 @@ mod tests {
     #[test]
     fn the_progress_is_the_number_of_bytes_read() {
         let bar = ProgressBar::hidden();
-        let (mut input, mut bytes) = (rough(&[1, 2, 3, 4, 5], Some(bar.clone())), Vec::new());
+        let of_it = bar.clone();
+        let (mut input, mut bytes) =
+            (rough(&[1, 2, 3, 4, 5], Some(Box::new(move |read| of_it.inc(read)))), Vec::new());
         for (len, expected) in [(2, 2), (4, 4), (3, 4)] {
             input.fill(&mut bytes, len).unwrap();
             assert_eq!(bar.position(), expected);

@@ -2,18 +2,29 @@
 //!
 //! Results go to standard output. Every failure gives one line on standard error and an exit code
 //! that distinguishes usage errors from other failures.
+//!
+//! In a browser, where there is no system, it only reads captures.
 
 mod args;
+#[cfg(not(target_family = "wasm"))]
 mod beside;
+#[cfg(not(target_family = "wasm"))]
 mod boards;
+#[cfg(not(target_family = "wasm"))]
 mod bus;
+#[cfg(not(target_family = "wasm"))]
 mod calibrate;
 mod captures;
 mod clock;
 pub mod columns;
+#[cfg(not(target_family = "wasm"))]
+mod command;
 mod decode;
+#[cfg(not(target_family = "wasm"))]
 mod drive;
+#[cfg(not(target_family = "wasm"))]
 mod export;
+#[cfg(not(target_family = "wasm"))]
 mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
@@ -22,141 +33,58 @@ mod freely;
 mod help;
 mod hex;
 mod input;
+mod kept;
+#[cfg(not(target_family = "wasm"))]
 mod lamp;
+#[cfg(not(target_family = "wasm"))]
 mod line;
+pub mod listen;
 mod listing;
+#[cfg(not(target_family = "wasm"))]
 mod manual;
+#[cfg(not(target_family = "wasm"))]
 mod network;
-#[cfg(not(unix))]
+#[cfg(not(any(unix, target_family = "wasm")))]
 mod no_sim;
 mod pcapng;
+#[cfg(not(target_family = "wasm"))]
 mod ping;
+#[cfg(not(target_family = "wasm"))]
 mod play;
 #[cfg(all(test, unix))]
 mod played;
+#[cfg(not(target_family = "wasm"))]
 mod plot;
+#[cfg(not(target_family = "wasm"))]
 mod ports;
+#[cfg(not(target_family = "wasm"))]
 mod record;
+#[cfg(not(target_family = "wasm"))]
 mod replay;
+#[cfg(not(target_family = "wasm"))]
 mod report;
+#[cfg(not(target_family = "wasm"))]
 mod rover;
+pub mod rows;
+#[cfg(not(target_family = "wasm"))]
 mod scan;
+#[cfg(not(target_family = "wasm"))]
 mod send;
+#[cfg(not(target_family = "wasm"))]
 mod session;
+#[cfg(not(target_family = "wasm"))]
 mod signals;
 #[cfg(unix)]
 mod sim;
+#[cfg(not(target_family = "wasm"))]
 mod spin;
+#[cfg(not(target_family = "wasm"))]
 mod stop;
 mod tables;
+#[cfg(not(target_family = "wasm"))]
 mod teller;
+#[cfg(not(target_family = "wasm"))]
 mod watch;
 
-use std::{ffi::OsString, process::ExitCode};
-
-use clap::{
-    Command as Description, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind,
-};
-
-use failure::Failure;
-use help::EXIT_CODES;
-
-/// Host tool for Ikeya MD and UCP lines
-#[derive(Debug, Parser)]
-#[command(name = "axle", bin_name = "axle", version)]
-#[command(after_help = EXIT_CODES, arg_required_else_help = true)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Debug, Subcommand)]
-enum Command {
-    Decode(decode::Args),
-    Plot(plot::Args),
-    Export(export::Args),
-    Scan(scan::Args),
-    Spin(spin::Args),
-    Drive(drive::Args),
-    Stop(stop::Args),
-    Ping(ping::Args),
-    Calibrate(calibrate::Args),
-    Lamp(lamp::Args),
-    Network(network::Args),
-    Watch(watch::Args),
-    Record(record::Args),
-    Extcap(extcap::Args),
-    Replay(replay::Args),
-    Send(send::Args),
-    #[cfg(unix)]
-    Sim(sim::Args),
-    Ports(ports::Args),
-    Completions(manual::CompletionsArgs),
-    Man(manual::ManArgs),
-    #[cfg(not(unix))]
-    Sim(no_sim::Args),
-}
-
-/// Runs the tool with these arguments, of which the first is its name.
-#[must_use]
-pub fn run_with(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let parsed = description().try_get_matches_from(args).and_then(|matches| {
-        Cli::from_arg_matches(&matches).map_err(|error| error.with_cmd(&description()))
-    });
-    let result = match parsed {
-        Ok(Cli { command }) => run(&command),
-        // --help and --version are "errors" that go to standard output.
-        Err(error) if !error.use_stderr() => error.print().map_err(Failure::Write),
-        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            // If standard error is closed, there is nowhere to print it.
-            let _ = error.print();
-            return ExitCode::from(2);
-        }
-        Err(error) => Err(Failure::usage(&error)),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
-    }
-}
-
-/// All subcommands with their arguments.
-fn description() -> Description {
-    with_negative_numbers(Cli::command())
-}
-
-/// Takes a negative number for a value, so that the message names the range, not an unknown option.
-fn with_negative_numbers(command: Description) -> Description {
-    command.mut_subcommands(with_negative_numbers).mut_args(|arg| {
-        let takes_value = arg.get_action().takes_values() && !arg.is_positional();
-        if takes_value { arg.allow_negative_numbers(true) } else { arg }
-    })
-}
-
-fn run(command: &Command) -> Result<(), Failure> {
-    match command {
-        Command::Decode(args) => decode::run(args),
-        Command::Plot(args) => plot::run(args),
-        Command::Export(args) => export::run(args),
-        Command::Scan(args) => scan::run(args),
-        Command::Spin(args) => spin::run(args),
-        Command::Drive(args) => drive::run(args),
-        Command::Stop(args) => stop::run(args),
-        Command::Ping(args) => ping::run(args),
-        Command::Calibrate(args) => calibrate::run(args),
-        Command::Lamp(args) => lamp::run(args),
-        Command::Network(args) => network::run(args),
-        Command::Watch(args) => watch::run(args),
-        Command::Record(args) => record::run(args),
-        Command::Extcap(args) => extcap::run(args),
-        Command::Replay(args) => replay::run(args),
-        Command::Send(args) => send::run(args),
-        #[cfg(unix)]
-        Command::Sim(args) => sim::run(args),
-        Command::Ports(args) => ports::run(args),
-        Command::Completions(args) => manual::print_completions(args, description()),
-        Command::Man(args) => manual::write_pages(args, description()),
-        #[cfg(not(unix))]
-        Command::Sim(_) => no_sim::run(),
-    }
-}
+#[cfg(not(target_family = "wasm"))]
+pub use command::run_with;

@@ -4,6 +4,7 @@
 //! So a batch of rows is all that is held, and a [`Sink`] takes it in: a file format.
 
 mod column;
+pub(crate) mod csv;
 mod described;
 mod hot;
 mod row;
@@ -17,7 +18,6 @@ use crate::{
     failure::Failure,
     listing::{Modes, Place, REASONS, Shown, SkippedBytes},
 };
-pub(crate) use column::Cell;
 use column::Unfit;
 pub use column::{Column, Values};
 use described::Described;

@@ -5,8 +5,6 @@ Captures as columns of Arrow: `read` and `scan`. Bytes: `Decoder`, `crc16`, and 
 simulated ones: `axlewire.sim`.
 """
 
-import atexit
-
 from axlewire._axlewire import (
     Bus,
     Capture,
@@ -27,16 +25,12 @@ from axlewire._axlewire import (
     StopsOwed,
     Table,
     __version__,
-    _leave_all,
     crc16,
     read,
     scan,
 )
 
-from axlewire import ikeya, sim, ucp
-
-# Motors that still turn are stopped, and seen to stand still.
-atexit.register(_leave_all)
+from axlewire import _signals, ikeya, sim, ucp  # noqa: F401
 
 __all__ = [
     "Bus",

@@ -22,11 +22,19 @@ class Bus:
     because whoever is at the keyboard may have gone. Each node is read, and told its set-point
     again, every `period_s`.
     """
+    def __contains__(self, node: SupportsIndex, /) -> bool:
+        """
+        Whether a node is online.
+        """
     def __enter__(self, /) -> Bus: ...
     def __exit__(self, /, kind: type | None, value: Any | None, trace: Any | None) -> None: ...
     def __getitem__(self, node: SupportsIndex, /) -> Node:
         """
         A node by its id, 1 to 8.
+        """
+    def __iter__(self, /) -> Iterator[str]:
+        """
+        The ids of the nodes that are online, as `online`.
         """
     def __new__(cls, /, port: "str | os.PathLike[str]", *, nodes: "Iterable[int] | None" = None, baud: SupportsIndex = 500000, dead_man_s: SupportsFloat | SupportsIndex | None = ..., reply_timeout_s: SupportsFloat | SupportsIndex | None = None, period_s: SupportsFloat | SupportsIndex = 0.02) -> Bus: ...
     def __repr__(self, /) -> str: ...

@@ -20,7 +20,7 @@ use axlewire::{
 use pyo3::{
     exceptions::{PyFileNotFoundError, PyKeyError, PyOSError, PyPermissionError, PyValueError},
     prelude::*,
-    types::{PyDict, PyType},
+    types::{PyDict, PyList, PyType},
 };
 
 use crate::{
@@ -99,8 +99,15 @@ pub(crate) fn within(seconds: f64, least: f64, most: f64) -> PyResult<Duration> 
     Err(PyValueError::new_err(format!("{seconds} s is not from {least} to {most} s")))
 }
 
-fn id(node: u8) -> PyResult<NodeId> {
-    NodeId::new(node).map_err(|error| PyKeyError::new_err(error.to_string()))
+fn id(node: i64) -> PyResult<NodeId> {
+    let id = u8::try_from(node).ok().and_then(|it| NodeId::new(it).ok());
+    id.ok_or_else(|| PyKeyError::new_err(format!("node id {node} is outside 1 to 8")))
+}
+
+/// A speed of a line, bit/s.
+pub(crate) fn baud_rate(baud: u32) -> PyResult<u32> {
+    let line = format!("{baud} bit/s is not from 1200 to 12000000");
+    (1200..=12_000_000).contains(&baud).then_some(baud).ok_or_else(|| PyValueError::new_err(line))
 }
 
 /// A motor bus on a serial port (Ikeya MD, boards with one motor).
@@ -131,15 +138,15 @@ impl Bus {
         reply_timeout_s: Option<f64>,
         period_s: f64,
     ) -> PyResult<Self> {
-        py.import("axlewire._signals")?.call_method0("guard")?;
         let path: std::path::PathBuf = port.extract()?;
+        py.import("axlewire._signals")?.call_method1("guard", (port,))?;
         let port = path.to_string_lossy().into_owned();
         let mut config = MasterConfig::usb_adapter();
-        config.baud = baud;
+        config.baud = baud_rate(baud)?;
         config.dead_man = dead_man_s.map(|it| within(it, 0.1, 3600.0)).transpose()?;
         config.polling = Polling::Every(span(period_s)?);
         if let Some(seconds) = reply_timeout_s {
-            config.reply_timeout = span(seconds)?;
+            config.reply_timeout = within(seconds, 0.0005, 1.0)?;
         }
         if let Some(nodes) = nodes {
             let nodes = nodes.try_iter()?.map(|node| id(node?.extract()?));
@@ -179,8 +186,18 @@ impl Bus {
     }
 
     /// A node by its id, 1 to 8.
-    fn __getitem__(slf: &Bound<'_, Self>, node: u8) -> PyResult<Node> {
+    fn __getitem__(slf: &Bound<'_, Self>, node: i64) -> PyResult<Node> {
         Ok(Node { bus: slf.clone().unbind(), id: id(node)? })
+    }
+
+    /// The ids of the nodes that are online, as `online`.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(PyList::new(py, self.online(py)?)?.try_iter()?.into_any())
+    }
+
+    /// Whether a node is online.
+    fn __contains__(&self, py: Python<'_>, node: i64) -> PyResult<bool> {
+        Ok(self.online(py)?.into_iter().any(|it| i64::from(it) == node))
     }
 
     /// The ids of the nodes that are online.
@@ -198,7 +215,7 @@ impl Bus {
     /// Stops these nodes, or all that were heard, and returns when their motors are seen to stand
     /// still. Raises `StopsOwed` or `StillMoving` with the nodes whose motors may be moving.
     #[pyo3(signature = (*nodes: "int") -> "None")]
-    fn stop(&self, py: Python<'_>, nodes: Vec<u8>) -> PyResult<()> {
+    fn stop(&self, py: Python<'_>, nodes: Vec<i64>) -> PyResult<()> {
         let nodes: PyResult<Vec<_>> = nodes.into_iter().map(id).collect();
         let nodes: NodeSet = nodes?.into_iter().collect();
         self.call(py, move |driver| {

@@ -28,6 +28,11 @@ impl<'py> FromPyObject<'_, 'py> for Data {
     }
 }
 
+/// The values of a frame as JSON has them: 0.1, and not 0.10000000149011612, for an `f32`.
+pub(crate) fn values(frame: &impl Serialize) -> serde_json::Result<Value> {
+    serde_json::from_str(&serde_json::to_string(frame)?)
+}
+
 /// A value of JSON in Python.
 pub(crate) fn python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     Ok(match value {
@@ -200,8 +205,8 @@ where
         while let Some(event) = self.decoder.decode(&mut bytes) {
             to.push(match event {
                 Event::Frame(frame) => {
-                    let fields = serde_json::to_value(&frame)
-                        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+                    let fields =
+                        values(&frame).map_err(|error| PyValueError::new_err(error.to_string()))?;
                     let (protocol, bytes) = (self.protocol, frame.whole().to_vec());
                     Py::new(py, Framed { protocol, bytes, fields })?.into_any()
                 }

@@ -133,14 +133,7 @@ fn raised(error: Error) -> PyErr {
     match &error {
         Error::Io(line, Some(number)) => PyOSError::new_err((*number, line.clone())),
         Error::Io(line, None) => PyOSError::new_err(line.clone()),
-        _ => PyValueError::new_err(raised_text(&error)),
-    }
-}
-
-fn raised_text(error: &Error) -> String {
-    match error {
-        Error::Io(line, _) | Error::Capture(line) | Error::Argument(line) => line.clone(),
-        Error::Stopped => "reading was stopped".to_owned(),
+        _ => PyValueError::new_err(error.to_string()),
     }
 }
 
@@ -193,9 +186,7 @@ pub(crate) fn read(
     };
     check_raised(&raised)?;
     let Whole { tables, numbers, schemas, summary } = read.map_err(self::raised)?;
-    if let Some(cut) = &summary.cut {
-        warn(py, cut)?;
-    }
+    warn_of(py, &summary)?;
     Ok(Capture { tables, numbers, schemas, summary, source: given, protocol })
 }
 
@@ -465,9 +456,14 @@ impl Scan {
     /// All was read: what is missing is told, once.
     fn end(&self, py: Python<'_>, summary: Option<Summary>) -> PyResult<()> {
         let Some(summary) = summary else { return Ok(()) };
-        let cut = summary.cut.clone();
+        let warned = warn_of(py, &summary);
         *self.summary.lock().unwrap_or_else(PoisonError::into_inner) = Some(summary);
-        cut.map_or(Ok(()), |cut| warn(py, &cut))
+        warned
+    }
+
+    /// Reads no more.
+    fn give_up(&self) -> Result<Option<Summary>, Error> {
+        self.reading.lock().map_err(|_| Error::Stopped)?.end()
     }
 
     /// The next batch of the message, or of any; `None` at the end.
@@ -493,7 +489,11 @@ impl Scan {
             // A list of all, say, asks without a look at signals of its own.
             py.check_signals()?;
             let next = py.detach(|| self.next_batch(SIGNALS_EVERY));
-            check_raised(&self.raised)?;
+            if let Err(error) = check_raised(&self.raised) {
+                // Nothing follows, neither what was read before.
+                drop(py.detach(|| self.give_up()));
+                return Err(error);
+            }
             match next.map_err(raised)? {
                 Next::Batch(batch) => {
                     let name = batch.table.clone();
@@ -553,12 +553,15 @@ impl Iterator for Batches {
                 Ok(Next::Batch(batch)) => return Some(Ok(scan.schemas.batch(batch))),
                 Ok(Next::Waits) => {}
                 Ok(Next::End(summary)) => {
-                    let ended = Python::try_attach(|py| scan.end(py, summary));
+                    // What a file has raised has ended the reading.
+                    let ended = Python::try_attach(|py| {
+                        check_raised(&scan.raised).and_then(|()| scan.end(py, summary))
+                    });
                     let failed = ended.and_then(Result::err)?;
                     return Some(Err(ArrowError::ExternalError(failed.to_string().into())));
                 }
                 Err(error) => {
-                    let line = raised_text(&error);
+                    let line = error.to_string();
                     return Some(Err(ArrowError::ExternalError(line.into())));
                 }
             }
@@ -583,6 +586,11 @@ fn account_of<'py>(py: Python<'py>, summary: &Summary) -> PyResult<Bound<'py, Py
     dict.set_item("times_back", summary.times_back)?;
     dict.set_item("cut", summary.cut.clone())?;
     Ok(dict)
+}
+
+/// What a capture is told to have, or to lack, as warnings.
+fn warn_of(py: Python<'_>, summary: &Summary) -> PyResult<()> {
+    summary.notes.iter().chain(&summary.cut).try_for_each(|line| warn(py, line))
 }
 
 /// Something that is no error, as a warning.

@@ -27,8 +27,8 @@ use pyo3::{
 use serde_json::Value;
 
 use crate::{
-    bus::{leave, leave_collected, not_opened, span, within as between},
-    bytes::python,
+    bus::{baud_rate, leave, leave_collected, not_opened, span, within as between},
+    bytes::{python, values},
     capture::SIGNALS_EVERY,
     trouble::Trouble,
     worker::{Driven, Leave, NAP, Worker, remember, sleep_until},
@@ -214,11 +214,11 @@ impl Rover {
         dead_man_s: f64,
         low_ids_only: bool,
     ) -> PyResult<Self> {
-        py.import("axlewire._signals")?.call_method0("guard")?;
         let path: std::path::PathBuf = port.extract()?;
+        py.import("axlewire._signals")?.call_method1("guard", (port,))?;
         let port = path.to_string_lossy().into_owned();
         let mut config = HostConfig::usb_adapter();
-        (config.baud, config.dead_man) = (baud, between(dead_man_s, 0.3, 60.0)?);
+        (config.baud, config.dead_man) = (baud_rate(baud)?, between(dead_man_s, 0.3, 60.0)?);
         config.low_ids_only = low_ids_only;
         let opened = py.detach(|| drive::Rover::open_with(&port, config));
         let rover = opened.map_err(|error| not_opened(&port, &error))?;
@@ -240,12 +240,16 @@ impl Rover {
     fn drive(
         &self,
         py: Python<'_>,
-        speed: i16,
-        angular: i16,
+        speed: i64,
+        angular: i64,
         seconds: Option<f64>,
     ) -> PyResult<()> {
         let seconds = seconds.map(span).transpose()?;
-        let command = MotorControl::new(speed, angular)
+        let percent = |it: i64| {
+            let line = format!("{it} percent is not from -100 to 100");
+            i16::try_from(it).map_err(|_| PyValueError::new_err(line))
+        };
+        let command = MotorControl::new(percent(speed)?, percent(angular)?)
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
         let order = self.call(py, move |driver| driver.order(command))?;
         let Some(seconds) = seconds else { return Ok(()) };
@@ -459,7 +463,7 @@ impl Report {
         let wrong = |error: &dyn Display| PyValueError::new_err(error.to_string());
         let frame = frame.map_err(|error| wrong(&error))?;
         let frame = Frame::parse(frame).map_err(|error| wrong(&error))?;
-        serde_json::to_value(frame).map_err(|error| wrong(&error))
+        values(&frame).map_err(|error| wrong(&error))
     }
 }
 

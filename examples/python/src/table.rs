@@ -110,7 +110,9 @@ impl Schemas {
     pub(crate) fn only(&self, message: &str, protocol: Option<&str>) -> PyResult<String> {
         let is_it = |name: &&str| {
             let (of, rest) = name.split_once('.').unwrap_or(("", name));
-            *name == message || (rest == message && protocol.is_none_or(|it| it == of))
+            *name == message
+                || (*name, message) == ("skipped", "gaps")
+                || (rest == message && protocol.is_none_or(|it| it == of))
         };
         let all = self.all.iter().map(|(name, _)| name.as_str());
         match *all.filter(is_it).collect::<Vec<_>>() {

@@ -374,6 +374,56 @@ os.wait(); time.sleep(0.1); print(it[1].velocity > 1)"""
     assert told(port, "node 1: at rest")
 
 
+def test_a_port_that_is_closed_is_free_although_a_forked_process_goes_on(port):
+    code = """it = bus(); turn(it)
+if os.fork() == 0:
+    sys.stdout.close(); time.sleep(8); os._exit(0)
+it.close(); it = bus(); print(it.discover(), flush=True)"""
+    process = child(code, port)
+    assert process.stdout.readline().startswith("{1: ")
+    process.wait(20)
+
+
+@pytest.mark.parametrize("ends", ["raise SystemExit", "1 / 0", "time.sleep(30)"])
+def test_motors_are_stopped_although_another_thread_never_ends(port, ends):
+    code = f"""it = bus(); turn(it)
+def log():
+    while True: it[1].velocity; time.sleep(0.05)
+threading.Thread(target=log).start()
+print("goes on", flush=True)
+{ends}"""
+    process = child(code, port)
+    assert process.stdout.readline() == "goes on\n"
+    if "sleep" in ends:
+        process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=15)
+    assert told(port, "node 1: at rest")
+
+
+def test_motors_are_stopped_before_the_program_is_suspended(port):
+    process = child("""it = bus(); turn(it); print("turns", flush=True); time.sleep(30)""", port)
+    assert process.stdout.readline() == "turns\n"
+    process.send_signal(signal.SIGTSTP)
+    assert told(port, "node 1: at rest")
+    process.send_signal(signal.SIGCONT)
+    process.kill()
+    process.communicate()
+
+
+def test_what_no_bus_can_mean_is_refused_in_plain_words(port):
+    for baud in [0, 1, True]:
+        with pytest.raises(ValueError, match="bit/s is not from 1200"):
+            Bus(port, baud=baud)
+    with pytest.raises(ValueError, match="0.0005"):
+        Bus(port, reply_timeout_s=0)
+    with Bus(port) as bus:
+        for node in [-1, 0, 9, 256]:
+            with pytest.raises(KeyError, match=f"node id {node} is outside 1 to 8"):
+                bus[node]
+        found = bus.discover()
+        assert list(bus) == list(found) and 1 in bus and 0 not in bus
+
+
 def test_what_was_asked_for_behind_a_ctrl_c_is_not_done(port):
     code = """it = bus(); it.discover()
 t = threading.Thread(target=lambda: it.stop(5), daemon=True); t.start(); time.sleep(0.1)

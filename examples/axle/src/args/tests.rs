@@ -48,7 +48,7 @@ fn the_speed_of_a_line_is_that_of_its_protocol_unless_another_is_given() {
 fn a_command_line_that_would_do_harm_is_refused() {
     let parsed = |words: &str| {
         let words = ["axle"].into_iter().chain(words.split(' '));
-        crate::description().try_get_matches_from(words).map_err(|error| error.to_string())
+        crate::command::description().try_get_matches_from(words).map_err(|error| error.to_string())
     };
     for (words, says) in [
         ("scan -p x -b 9599", "9599 is not in 9600"),
@@ -100,7 +100,7 @@ fn defaults(command: &clap::Command, path: &str, found: &mut Vec<String>) {
 #[test]
 fn every_default_is_as_it_is_written_here() {
     let mut found = Vec::new();
-    defaults(&crate::description(), "", &mut found);
+    defaults(&crate::command::description(), "", &mut found);
     let motion = found.iter().filter(|line| {
         ["spin", "drive", "send", "replay", "ping", "decode", "scan"]
             .iter()

@@ -97,6 +97,8 @@ pub(super) fn of_bytes<F: Framing>(bytes: &[u8]) -> Counters {
 fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
     #[cfg(unix)]
     return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
+    #[cfg(not(any(unix, windows)))]
+    return Err(io::ErrorKind::Unsupported.into());
     #[cfg(windows)]
     {
         let (mut rest, mut at) = (bytes, offset);

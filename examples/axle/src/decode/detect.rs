@@ -13,10 +13,10 @@ use crate::{args::Protocol, failure::Failure, input::Input};
 
 /// Share of some bytes that belongs to frames of a protocol.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) struct Share {
-    pub(super) protocol: Protocol,
-    pub(super) framed: u64,
-    pub(super) frames: u64,
+pub(crate) struct Share {
+    pub(crate) protocol: Protocol,
+    pub(crate) framed: u64,
+    pub(crate) frames: u64,
 }
 
 /// The likely protocol of raw bytes, judged by their beginning.
@@ -65,7 +65,7 @@ const SURE_FRAMES: u64 = 3;
 
 /// The share of each protocol in `sample`, the largest first. Its end counts as a quiet line, as
 /// the end of the input does: a false header in a short input hides no frame (ruling B3).
-pub(super) fn shares(sample: &[u8]) -> [Share; 3] {
+pub(crate) fn shares(sample: &[u8]) -> [Share; 3] {
     let mut shares = [
         share::<ucp::Ucp>(Protocol::Ucp, sample),
         share::<ikeya::BothDirections>(Protocol::Ikeya, sample),

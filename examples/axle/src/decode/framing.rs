@@ -3,7 +3,12 @@
 use axlewire::stream::Framing;
 
 use super::{Stream, StreamOf, args::Direction};
-use crate::{args::Protocol, failure::Failure, listing::Shown, pcapng};
+use crate::{
+    args::Protocol,
+    failure::Failure,
+    listing::{Place, Shown},
+    pcapng,
+};
 
 /// A generic function for the framing of this protocol, in one direction or in both. UCP frames
 /// show their own.
@@ -59,16 +64,21 @@ impl Choice {
         self,
         protocol: Protocol,
         interface: Option<usize>,
-        way: Option<pcapng::Direction>,
+        direction: Option<pcapng::Direction>,
     ) -> Box<dyn Stream> {
-        for_framing!(boxed, protocol, self.direction)(interface, way)
+        self.stream_at(protocol, Place { interface, direction, ..Place::default() })
+    }
+
+    /// The stream whose first byte is at this place.
+    pub(super) fn stream_at(self, protocol: Protocol, place: Place) -> Box<dyn Stream> {
+        for_framing!(boxed, protocol, self.direction)(place)
     }
 }
 
-fn boxed<F>(interface: Option<usize>, way: Option<pcapng::Direction>) -> Box<dyn Stream>
+fn boxed<F>(place: Place) -> Box<dyn Stream>
 where
     F: Framing + 'static,
     for<'a> F::Frame<'a>: Shown,
 {
-    Box::new(StreamOf::<F>::of_line(interface, way))
+    Box::new(StreamOf::<F>::at(place))
 }

@@ -24,11 +24,12 @@ use crate::{
     captures,
     failure::Failure,
     input::{self, Form, Input},
-    listing::Shown,
+    listing::{Place, Shown},
     pcapng,
 };
 use args::style;
 pub(crate) use args::{Args, Direction, Named};
+pub(crate) use detect::shares;
 use detect::{guess, no_frame};
 pub(crate) use framing::Choice;
 use framing::for_framing;
@@ -62,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let run = for_framing!(decode, protocol, choice.direction);
     let account = run(args, protocol, &mut input)?;
     if account.frames == 0 && account.received > 0 {
-        return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(input.first()))));
+        return Err(Failure::Failed(no_frame(protocol, &account, &shares(input.first()))));
     }
     Ok(())
 }
@@ -70,6 +71,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// A stream of this protocol, in one direction of a line.
 pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box<dyn Stream> {
     Choice::default().stream(protocol, None, Some(direction))
+}
+
+/// Lists a frame that was at this place.
+pub(crate) fn list_again(protocol: Protocol, at: Place, frame: &[u8], sheet: &mut Sheet) {
+    let mut stream = Choice::default().stream_at(protocol, at);
+    stream.feed(frame, at.micros, sheet);
+    stream.finish(sheet);
 }
 
 /// All frames of a capture of one line, as far as it can be read, and the modes of its nodes.

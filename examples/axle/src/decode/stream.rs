@@ -12,6 +12,7 @@ use axlewire::{
 
 use crate::{
     args::Protocol,
+    kept::Kept,
     listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style, Table},
     pcapng::Direction,
     tables::Tables,
@@ -38,6 +39,8 @@ pub(crate) struct Sheet {
     pub(crate) table: Option<Table>,
     /// Frames and gaps as rows of typed columns, if they are wanted.
     pub(crate) tables: Option<Tables>,
+    /// All of them close together, if they are wanted.
+    pub(crate) kept: Option<Kept>,
     /// How many more frames are wanted, if not all.
     pub(crate) wanted: Option<u64>,
 }
@@ -77,6 +80,7 @@ impl Sheet {
             taken: None,
             table: None,
             tables: None,
+            kept: None,
             wanted: None,
         }
     }
@@ -99,10 +103,31 @@ impl Sheet {
             && self.taken.is_none()
             && self.table.is_none()
             && self.tables.is_none()
+            && self.kept.is_none()
             && self.wanted.is_none()
     }
 
+    /// Takes in a gap.
+    pub(crate) fn gap(&mut self, at: Place, gap: &SkippedBytes) {
+        if let Some(kept) = &mut self.kept {
+            kept.gap(at, gap);
+        }
+        if let Some(tables) = &mut self.tables {
+            tables.gap(at, gap);
+        }
+        if let Some(style) = self.style {
+            style.gap(&mut self.out, &mut self.clock, at, gap);
+        }
+        if let Some(marks) = &mut self.marks {
+            let end = self.out.0.len();
+            marks.push(Mark { end, at, protocol: None, message: "skipped" });
+        }
+    }
+
     fn take<S: Shown>(&mut self, at: Place, frame: &S) {
+        if let Some(kept) = &mut self.kept {
+            kept.frame(at, frame, &self.modes);
+        }
         if let Some(style) = self.style {
             style.frame(&mut self.out, &mut self.clock, at, frame, &self.modes);
         }
@@ -168,11 +193,9 @@ where
         Self { decoder, place, gap: None, booked, chunks: VecDeque::new() }
     }
 
-    /// The bytes of a line with times.
-    pub(super) fn of_line(interface: Option<usize>, direction: Option<Direction>) -> Self {
-        let mut stream = Self::new(0);
-        (stream.place.interface, stream.place.direction) = (interface, direction);
-        stream
+    /// A stream whose first byte is at this place; its time does not matter.
+    pub(super) fn at(place: Place) -> Self {
+        Self { place, ..Self::new(0) }
     }
 
     fn drain(&mut self, bytes: &mut &[u8], sheet: &mut Sheet) {
@@ -199,7 +222,7 @@ where
                 }
                 Event::Frame(frame) => {
                     if let Some((at, gap)) = self.gap.take() {
-                        list_gap(sheet, at, &gap);
+                        sheet.gap(at, &gap);
                     }
                     let length = frame.bytes().len() as u64;
                     let at = place_of(&mut self.place, &mut self.chunks, length);
@@ -244,25 +267,12 @@ where
             }
         }
         if let Some((at, gap)) = self.gap.take() {
-            list_gap(sheet, at, &gap);
+            sheet.gap(at, &gap);
         }
     }
 
     fn counters(&self) -> Counters {
         self.decoder.counters()
-    }
-}
-
-fn list_gap(sheet: &mut Sheet, at: Place, gap: &SkippedBytes) {
-    if let Some(tables) = &mut sheet.tables {
-        tables.gap(at, gap);
-    }
-    if let Some(style) = sheet.style {
-        style.gap(&mut sheet.out, &mut sheet.clock, at, gap);
-    }
-    if let Some(marks) = &mut sheet.marks {
-        let end = sheet.out.0.len();
-        marks.push(Mark { end, at, protocol: None, message: "skipped" });
     }
 }
 

@@ -48,6 +48,8 @@ pub(crate) struct Walked {
     bad_times: (u64, u64),
     /// Why the capture could not be read to its end. What is before that is on the sheet.
     pub(crate) cut: Option<Failure>,
+    /// What a program is told, not standard error.
+    pub(crate) notes: Option<Vec<String>>,
     /// There are several captures.
     is_collection: bool,
     /// Why the walk was given up. What was read is on the sheet.
@@ -71,23 +73,27 @@ impl Walked {
         None
     }
 
-    fn warn(&self) {
+    fn warn(&mut self) {
         let (count, first) = self.bad_times;
         if count > 0 {
             let (packets, have) = if count == 1 { ("packet", "has") } else { ("packets", "have") };
-            eprintln!(
-                "axle: {count} {packets} {have} an impossible time, which is left out: the first \
-                 is packet {first}"
+            let line = format!(
+                "{count} {packets} {have} an impossible time, which is left out: the first is \
+                 packet {first}"
             );
+            match &mut self.notes {
+                Some(notes) => notes.push(line),
+                None => eprintln!("axle: {line}"),
+            }
         }
     }
 
     /// A capture could not be read to its end. The first is told at the end.
     fn miss(&mut self, failure: Failure) {
-        if self.cut.is_some() {
-            let _ = failure.report();
-        } else {
-            self.cut = Some(failure);
+        match (&self.cut, &mut self.notes) {
+            (None, _) => self.cut = Some(failure),
+            (Some(_), Some(notes)) => notes.push(failure.to_string()),
+            (Some(_), None) => drop(failure.report()),
         }
     }
 
@@ -112,6 +118,7 @@ pub(crate) fn walk(
 ) -> Walked {
     let (lines, mut walked) = (BTreeMap::new(), Walked::default());
     walked.is_collection = input.is_of_a_collection();
+    walked.notes = input.is_quiet().then(Vec::new);
     let ports = (walked.is_collection || choice.joins_sections).then(BTreeMap::new);
     input.take_left_out().into_iter().for_each(|failure| walked.miss(failure));
     let foreign = BTreeSet::new();

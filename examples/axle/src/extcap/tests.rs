@@ -26,9 +26,9 @@ fn said(say: impl FnOnce(&mut String)) -> String {
 fn args(line: &str) -> Args {
     use clap::{CommandFactory, FromArgMatches};
     let words = ["axle", "extcap"].into_iter().chain(line.split_whitespace());
-    let matches = crate::Cli::command().try_get_matches_from(words).unwrap();
-    match crate::Cli::from_arg_matches(&matches).unwrap().command {
-        crate::Command::Extcap(args) => args,
+    let matches = crate::command::Cli::command().try_get_matches_from(words).unwrap();
+    match crate::command::Cli::from_arg_matches(&matches).unwrap().command {
+        crate::command::Command::Extcap(args) => args,
         other => panic!("{other:?}"),
     }
 }

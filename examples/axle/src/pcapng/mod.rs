@@ -11,18 +11,23 @@
 //! interrupts a read; another crate takes every unit for nanoseconds. To write files, one pulls in
 //! a second `syn`, the other `futures`. Format: draft-ietf-opsawg-pcapng.
 
+#[cfg(not(target_family = "wasm"))]
 mod background;
 mod classic;
 mod format;
+#[cfg(not(target_family = "wasm"))]
 mod keeper;
 mod read;
+#[cfg(not(target_family = "wasm"))]
 mod recording;
 mod write;
 
+#[cfg(not(target_family = "wasm"))]
 pub(crate) use background::Background;
 pub(crate) use classic::is_capture;
 pub(crate) use format::{Direction, link_type, protocol_of};
 pub(crate) use read::{LATEST_US, Packet, Reader};
+#[cfg(not(target_family = "wasm"))]
 pub(crate) use recording::{Recording, Rotation, Stamp};
 pub(crate) use write::Writer;
 

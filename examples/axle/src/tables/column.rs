@@ -143,6 +143,19 @@ impl Column {
         }
     }
 
+    /// The rows as numbers for a plot; NaN for what is absent, or is no number. Times are in
+    /// microseconds.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<f64> {
+        let number = |cell| match cell {
+            Some(Cell::Integer(value)) => value as f64,
+            Some(Cell::Unsigned(value) | Cell::Time(value)) => value as f64,
+            Some(Cell::Float(value)) => value.into(),
+            Some(Cell::Name(_) | Cell::Bytes(_)) | None => f64::NAN,
+        };
+        self.cells().map(number).collect()
+    }
+
     /// The values of the rows in their order.
     pub(crate) fn cells(&self) -> impl Iterator<Item = Option<Cell<'_>>> {
         let (mut row, mut next) = (0, 0);

@@ -11,7 +11,7 @@ use axlewire::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::*;
+use super::{column::Cell, *};
 use crate::{
     decode::{self, Sheet},
     input::{Form, Input},
