@@ -1,0 +1,6 @@
+let timer: ReturnType<typeof setTimeout> | undefined;
+
+onmessage = ({ data }: MessageEvent<number>) => {
+  clearTimeout(timer);
+  timer = setTimeout(() => postMessage(null), data);
+};

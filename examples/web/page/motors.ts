@@ -1,0 +1,177 @@
+/** A bus of motors: what each of them reports, how far its stop has come, and the orders that it can be given. */
+import {
+  type BusNode,
+  type BusState,
+  isPending,
+  type Simulation,
+  STOP_WORDS,
+  type Truth,
+} from "./contract.ts";
+import { make, say } from "./dom.ts";
+import type { Session } from "./session.ts";
+import { Disc } from "./disc.ts";
+import type { Bus } from "./wasm.ts";
+
+export type BusSession = Session<Bus, BusState>;
+
+const HEALTH_WORDS: Record<BusNode["health"], string> = {
+  online: "answers",
+  suspect: "does not answer at the moment",
+  abnormal: "does not answer",
+  unknown: "not heard yet",
+};
+
+/** What a person can mean. The crate takes any number, and what a motor can do is not known here. */
+const LIMITS = { min: "-50", max: "50" };
+
+/** The cards of a bus, one for each node that was heard. */
+export class Motors {
+  private readonly cards = new Map<number, MotorCard>();
+
+  constructor(
+    private readonly place: HTMLElement,
+    private readonly session: BusSession,
+    private readonly refused: (why: string) => void,
+    private readonly simulation?: Simulation,
+  ) {
+    place.replaceChildren();
+  }
+
+  show(state: BusState, mayMove: boolean): void {
+    for (const node of state.nodes) {
+      const isThere = node.mode !== null || isPending(node.stop);
+      if (!isThere) continue;
+      if (this.cards.get(node.id)?.node.mode !== node.mode) this.add(node);
+      this.cards.get(node.id)?.show(node, mayMove, this.simulation?.truth());
+    }
+  }
+
+  private add(node: BusNode): void {
+    this.cards.get(node.id)?.element.remove();
+    const card = new MotorCard(node, this.session, this.refused, this.simulation);
+    this.cards.set(node.id, card);
+    const next = [...this.cards.keys()].filter((id) => id > node.id).sort((a, b) => a - b)[0];
+    this.place.insertBefore(
+      card.element,
+      (next !== undefined && this.cards.get(next)?.element) || null,
+    );
+  }
+}
+
+class MotorCard {
+  readonly element: HTMLElement;
+  private readonly disc: Disc | undefined;
+  private readonly really = make("dd");
+  private readonly reported = make("dd");
+  private readonly health = make("dd");
+  private readonly stop = make("dd");
+  private readonly goal = make("input", { type: "number", step: "any", required: "", ...LIMITS });
+  private readonly turn = make("button", { type: "submit" });
+
+  constructor(
+    readonly node: BusNode,
+    private readonly session: BusSession,
+    private readonly refused: (why: string) => void,
+    simulation: Simulation | undefined,
+  ) {
+    const name = `Motor ${node.id}`;
+    const isSpeed = node.mode !== "position";
+    this.goal.value = isSpeed ? "1" : "2";
+    this.turn.append(isSpeed ? "Turn" : "Go", make("span", { class: "spoken" }, ` (${name})`));
+    const halt = make(
+      "button",
+      { type: "button" },
+      "Stop",
+      make("span", { class: "spoken" }, ` ${name}`),
+    );
+    halt.addEventListener("click", () => this.give((bus, now) => bus.stop(node.id, now)));
+    const orders = make(
+      "form",
+      { class: "orders", novalidate: "" },
+      make("label", {}, isSpeed ? "turns/s " : "to turn ", this.goal),
+      this.turn,
+      halt,
+    );
+    orders.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.move();
+    });
+    const facts = make("dl", {});
+    const fact = (term: string, value: HTMLElement) =>
+      facts.append(make("div", {}, make("dt", {}, term), value));
+    if (simulation) fact("Really", this.really);
+    fact("Bus says", this.reported);
+    fact("Cable", this.health);
+    fact("Stop", this.stop);
+    this.element = make(
+      "li",
+      { class: "card" },
+      make("h3", {}, name, " ", make("small", {}, isSpeed ? "holds a speed" : "holds a position")),
+    );
+    if (simulation) {
+      this.disc = new Disc();
+      this.element.append(this.disc.element);
+    }
+    this.element.append(facts, orders);
+    if (simulation)
+      this.element.append(plug(name, (isUnplugged) => simulation.unplug(node.id, isUnplugged)));
+  }
+
+  show(node: BusNode, mayMove: boolean, truth: Truth | undefined): void {
+    const real = truth?.nodes?.find(({ id }) => id === node.id);
+    if (real) {
+      this.disc?.turnTo(real.turns);
+      say(this.really, `${real.rps.toFixed(2)} turns/s`);
+    }
+    say(this.reported, report(node));
+    say(this.health, HEALTH_WORDS[node.health] ?? node.health);
+    say(this.stop, STOP_WORDS[node.stop]);
+    this.element.dataset.stop = node.stop;
+    if (this.turn.disabled === mayMove) this.turn.disabled = !mayMove;
+  }
+
+  private move(): void {
+    if (!this.goal.checkValidity())
+      return this.refused(
+        `Motor ${this.node.id}: a number from ${LIMITS.min} to ${LIMITS.max}, please. Nothing was sent.`,
+      );
+    const goal = this.goal.valueAsNumber;
+    const { id, mode } = this.node;
+    this.give((bus, now) =>
+      mode === "position" ? bus.set_position(id, goal, now) : bus.set_velocity(id, goal, now),
+    );
+  }
+
+  private give(order: (bus: Bus, now: number) => void): void {
+    this.refused(this.session.ask(order));
+  }
+}
+
+function report(node: BusNode): string {
+  const [value, unit] =
+    node.mode === "position" ? [node.position, "turns"] : [node.velocity, "turns/s"];
+  if (value === null) return "nothing yet";
+  const age = node.age_ms ?? 0;
+  return `${value.toFixed(2)} ${unit}${age < 300 ? "" : `, ${(age / 1000).toFixed(1)} s ago`}`;
+}
+
+/** A plug that can be pulled. */
+export function plug(name: string, pull: (isUnplugged: boolean) => void): HTMLElement {
+  const box = make("input", { type: "checkbox", "aria-label": `Plug of ${name} pulled` });
+  box.addEventListener("change", () => pull(box.checked));
+  return make("label", { class: "plug" }, box, " plug pulled");
+}
+
+/** Nodes whose stop was asked for and has not ended yet. */
+export const pendingStops = (state: BusState): BusNode[] =>
+  state.nodes.filter((node) => isPending(node.stop));
+
+/** How far the stop of a bus has come, in one sentence. */
+export function busStopWords(state: BusState): string {
+  const names = (progress: BusNode["stop"]) =>
+    state.nodes.filter((node) => node.stop === progress).map((node) => node.id);
+  const parts = (["still_moving", "owed", "confirmed", "standing_still"] as const)
+    .filter((progress) => names(progress).length > 0)
+    .map((progress) => `Motor ${names(progress).join(", ")}: ${STOP_WORDS[progress]}.`);
+  return parts.length > 0 ? parts.join(" ") : "No stop was asked for.";
+}

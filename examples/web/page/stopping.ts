@@ -1,0 +1,80 @@
+/** The stop that is always at hand: the bar, the space bar, and what happens when the page is hidden or closed. */
+import { button, say, show, the } from "./dom.ts";
+
+/** Something with motors in it. */
+export interface Machine {
+  stop(): void;
+  /** Stops, and forbids further movement until a person allows it again. */
+  disarm(why: string): void;
+  stopWithoutWaiting(): void;
+  keepAlive(): void;
+  /** It may be moving, or is allowed to. */
+  isAtRisk(): boolean;
+  /** How far the stop has come, in a few words. */
+  words(): string;
+}
+
+const machines = new Set<Machine>();
+const bar = the("stop-bar", HTMLElement);
+const words = the("stop-words", HTMLElement);
+
+/** From now on the stop bar is there and stops this machine. */
+export function guard(machine: Machine): void {
+  machines.add(machine);
+  show(bar, true);
+}
+
+export function unguard(machine: Machine): void {
+  machines.delete(machine);
+  show(bar, machines.size > 0);
+}
+
+/** Called with each picture that the page draws. */
+export function showStop(): void {
+  say(words, [...machines].map((machine) => machine.words()).join(" "));
+}
+
+function stopAll(): void {
+  for (const machine of machines) machine.stop();
+}
+
+const takesText = (target: EventTarget | null): boolean =>
+  target instanceof HTMLTextAreaElement ||
+  (target instanceof HTMLInputElement && ["text", "search"].includes(target.type));
+
+/** The space bar stops, also where it would press a button, open a list or tick a box: for these there is the enter key. */
+function key(event: KeyboardEvent): void {
+  if (machines.size === 0 || takesText(event.target)) return;
+  const isDown = event.type === "keydown" && !event.repeat;
+  const isBox = event.target instanceof HTMLInputElement && event.target.type === "checkbox";
+  if (event.key !== " " && !(event.key === "Enter" && isBox)) return;
+  event.preventDefault();
+  event.stopPropagation();
+  if (isDown && event.key === " ") stopAll();
+  else if (isDown) (event.target as HTMLInputElement).click();
+}
+
+function personIsThere(): void {
+  for (const machine of machines) machine.keepAlive();
+}
+
+export function start(): void {
+  for (const type of ["pointerdown", "click"]) button("stop").addEventListener(type, stopAll);
+  for (const type of ["keydown", "keyup"] as const) addEventListener(type, key, { capture: true });
+  for (const type of ["pointerdown", "pointermove", "keydown", "wheel", "touchmove"]) {
+    addEventListener(type, personIsThere, { capture: true, passive: true });
+  }
+  document.addEventListener("visibilitychange", () => {
+    if (document.visibilityState !== "hidden") return;
+    for (const machine of machines)
+      machine.disarm("The page was hidden: all motors are told to stop.");
+  });
+  addEventListener("pagehide", () => {
+    for (const machine of machines) if (machine.isAtRisk()) machine.stopWithoutWaiting();
+  });
+  addEventListener("beforeunload", (event) => {
+    const atRisk = [...machines].filter((machine) => machine.isAtRisk());
+    for (const machine of atRisk) machine.stopWithoutWaiting();
+    if (atRisk.length > 0) event.preventDefault();
+  });
+}

@@ -1,0 +1,235 @@
+//! The master of a motor bus.
+
+use axlewire::{
+    ikeya::{
+        Master, NodeId, Position, Rps,
+        board::{Status, Target},
+        master::{Cause, Health, MasterConfig, MasterEvent, Polling, StopProgress},
+    },
+    time::Duration,
+};
+use serde_json::{Value, json};
+use wasm_bindgen::prelude::*;
+
+use crate::{
+    session::{Session, instant, span},
+    thrown,
+};
+
+/// How long a browser may take to deliver an answer.
+const DELIVERY: Duration = Duration::from_millis(40);
+
+/// How often each node is read, and told its set-point.
+const PERIOD: Duration = Duration::from_millis(25);
+
+/// A master with boards of one motor.
+#[wasm_bindgen]
+pub struct Bus(Session<Master>);
+
+#[wasm_bindgen]
+impl Bus {
+    /// A master that stops all motors if nobody gives a sign of life for this long.
+    #[wasm_bindgen(constructor)]
+    pub fn new(baud: u32, dead_man_ms: f64, now: f64) -> Self {
+        let mut config = MasterConfig::usb_adapter();
+        config.baud = baud;
+        (config.reply_timeout, config.late_guard) = (DELIVERY, DELIVERY);
+        config.polling = Polling::Every(PERIOD);
+        config.dead_man = Some(span(dead_man_ms));
+        // The clock of a page has steps of 100 µs.
+        config.accepts_early = true;
+        Self(Session::new(Master::new(config, instant(now)), now))
+    }
+
+    /// Takes in what was received.
+    pub fn receive(&mut self, bytes: &[u8], now: f64) {
+        self.0.receive(bytes, now);
+    }
+
+    /// The next packet to write, if one is due. Call it again until there is none.
+    pub fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
+        self.0.transmit(now)
+    }
+
+    /// What has become of a packet.
+    pub fn sent(&mut self, ok: bool, now: f64) {
+        self.0.sent(ok, now);
+    }
+
+    /// Milliseconds until `transmit` is to be called, even if nothing is received.
+    pub fn wait(&self, now: f64) -> Option<f64> {
+        self.0.wait(now)
+    }
+
+    /// Asks all ids.
+    pub fn discover(&mut self, now: f64) {
+        self.0.role.discover(instant(now));
+    }
+
+    /// Turns a motor, turns per second.
+    pub fn set_velocity(&mut self, node: u8, rps: f32, now: f64) -> Result<(), JsError> {
+        let target = Rps::new(rps).map_err(thrown)?;
+        self.0.role.set_velocity(id(node)?, target, instant(now)).map_err(thrown)
+    }
+
+    /// Moves a motor there, turns.
+    pub fn set_position(&mut self, node: u8, turns: f64, now: f64) -> Result<(), JsError> {
+        let target = Position::from_revolutions(turns).map_err(thrown)?;
+        self.0.role.set_position(id(node)?, target, instant(now)).map_err(thrown)
+    }
+
+    /// Stops a motor; the stop is repeated until the motor is seen to stand still.
+    pub fn stop(&mut self, node: u8, now: f64) -> Result<(), JsError> {
+        self.0.role.stop(id(node)?, instant(now));
+        Ok(())
+    }
+
+    /// Stops all that were heard, or are owed a stop. Before any was heard: all ids.
+    pub fn stop_all(&mut self, now: f64) {
+        let role = &mut self.0.role;
+        let known = |node: &NodeId| role.mode(*node).is_some() || role.stops_owed().contains(*node);
+        let nodes: Vec<_> = NodeId::ALL.into_iter().filter(known).collect();
+        match &*nodes {
+            [] => role.stop_all(instant(now)),
+            nodes => nodes.iter().for_each(|node| role.stop(*node, instant(now))),
+        }
+    }
+
+    /// Somebody is there.
+    pub fn keep_alive(&mut self, now: f64) {
+        self.0.role.keep_alive(instant(now));
+    }
+
+    /// What the master knows.
+    pub fn state(&self, now: f64) -> String {
+        let role = &self.0.role;
+        let nodes: Vec<_> = NodeId::ALL.into_iter().map(|node| self.node(node, now)).collect();
+        let owed: Vec<_> = role.stops_owed().iter().map(NodeId::get).collect();
+        let coasting: Vec<_> = role.coasting().iter().map(NodeId::get).collect();
+        let seen = role.statistics();
+        json!({
+            "discovering": role.is_discovering(),
+            "nodes": nodes,
+            "stops_owed": owed,
+            "coasting": coasting,
+            "is_quiet": owed.is_empty() && coasting.is_empty(),
+            "statistics": {
+                "reads": seen.reads,
+                "writes": seen.writes,
+                "stale_bytes": seen.stale_bytes,
+                "dead_man": seen.dead_man,
+                "skipped": role.counters().skipped(),
+            },
+        })
+        .to_string()
+    }
+
+    /// What has happened since the last call.
+    pub fn events(&mut self) -> String {
+        let events = std::mem::take(&mut self.0.events);
+        json!(events.iter().filter_map(|(t, event)| told(*t, event)).collect::<Vec<_>>())
+            .to_string()
+    }
+
+    fn node(&self, node: NodeId, now: f64) -> Value {
+        let role = &self.0.role;
+        let (velocity, position, age) = match role.status(node) {
+            Some((Status::Velocity(rps), at)) => (Some(rps), None, Some(at)),
+            Some((Status::Position(at_turns), at)) => {
+                (None, Some(at_turns.revolutions()), Some(at))
+            }
+            None => (None, None, None),
+        };
+        let counts = role.node_statistics(node);
+        json!({
+            "id": node.get(),
+            "mode": role.mode(node).map(|mode| mode.to_string()),
+            "health": match role.health(node) {
+                None => "unknown",
+                Some(Health::Online) => "online",
+                Some(Health::Suspect(_)) => "suspect",
+                Some(Health::Abnormal) => "abnormal",
+            },
+            "velocity": velocity,
+            "position": position,
+            "age_ms": age.map(|at| now - at.as_micros() as f64 / 1e3),
+            "target": role.set_point(node).map(|target| match target {
+                Target::Velocity(rps) => rps.get(),
+                Target::Position(at) => at.revolutions() as f32,
+            }),
+            "stop": match role.stop_progress(node) {
+                StopProgress::NotAsked => "not_asked",
+                StopProgress::Owed => "owed",
+                StopProgress::Confirmed => "confirmed",
+                StopProgress::StandingStill => "standing_still",
+                StopProgress::StillMoving => "still_moving",
+            },
+            "timeouts": counts.timeouts,
+            "replies": counts.replies,
+        })
+    }
+}
+
+fn id(node: u8) -> Result<NodeId, JsError> {
+    NodeId::new(node).map_err(thrown)
+}
+
+/// An event as a sentence; a status is none, since it is a part of the state.
+fn told(t: f64, event: &MasterEvent) -> Option<Value> {
+    let (name, node, text) = match event {
+        MasterEvent::Discovered { node, mode } => {
+            ("discovered", Some(node), format!("node {node} found, {mode} mode"))
+        }
+        MasterEvent::DiscoveryDone { online } => {
+            let nodes = if *online == 1 { "node" } else { "nodes" };
+            ("discovery_done", None, format!("scan done: {online} {nodes}"))
+        }
+        MasterEvent::ReadFailed { node, cause } => {
+            let why = match cause {
+                Cause::Silent => "no answer",
+                Cause::Damaged => "damaged bytes",
+                _ => "no answer of its own",
+            };
+            ("read_failed", Some(node), format!("node {node}: {why}"))
+        }
+        MasterEvent::Health { node, health } => {
+            let text = match health {
+                Health::Online => "answers",
+                Health::Suspect(_) => return None,
+                Health::Abnormal => {
+                    "does not answer any more: it may be moving, and is told to stop"
+                }
+            };
+            ("health", Some(node), format!("node {node} {text}"))
+        }
+        MasterEvent::ModeChanged { node, mode } => {
+            ("mode_changed", Some(node), format!("node {node} is in {mode} mode now"))
+        }
+        MasterEvent::ModeInDoubt { node } => {
+            ("mode_in_doubt", Some(node), format!("node {node}: its mode is in doubt"))
+        }
+        MasterEvent::StopBlocked { node } => {
+            let text = "cannot be told to stop yet: its mode is not known";
+            ("stop_blocked", Some(node), format!("node {node} {text}"))
+        }
+        MasterEvent::Stopped { node } => {
+            ("stopped", Some(node), format!("node {node} has confirmed its stop"))
+        }
+        MasterEvent::StandingStill { node } => {
+            ("standing_still", Some(node), format!("node {node} is seen to stand still"))
+        }
+        MasterEvent::StillMoving { node, .. } => {
+            let text = "was told to stop, and still moves";
+            ("still_moving", Some(node), format!("node {node} {text}"))
+        }
+        MasterEvent::DeadMan => {
+            ("dead_man", None, "nobody was there: all motors are stopped".to_owned())
+        }
+        MasterEvent::NotConfirmed { node, .. } => {
+            ("not_confirmed", Some(node), format!("node {node} has not confirmed its command"))
+        }
+        // Status, and a command that was confirmed.
+        _ => return None,
+    };
+    Some(json!({ "t": t, "event": name, "node": node.map(|node| node.get()), "text": text }))
+}
