@@ -2,6 +2,7 @@
 # Builds the page: one file, OUT/index.html, which needs no network and no server.
 #
 #   examples/web/build.sh OUT
+#   examples/web/build.sh OUT --site    with the docs of the crate and the guide in OUT/doc
 #
 # Needs Rust, node 20 or later, and for the browser's target either `rustup target add
 # wasm32-unknown-unknown` or Debian's compiler, which is installed.
@@ -24,5 +25,9 @@ npx wasm-opt -Oz --enable-bulk-memory --enable-bulk-memory-opt --enable-multival
     --enable-sign-ext --strip-debug --strip-producers pkg/axlewire_web_bg.wasm \
     -o pkg/axlewire_web_bg.wasm
 npx tsc --noEmit
+[ "${2-}" != --site ] || export VITE_DOCS=doc/axlewire/index.html
 npx vite build --logLevel warn --outDir "$out" --emptyOutDir
+[ -z "${VITE_DOCS-}" ] || (cd ../.. &&
+    cargo doc --quiet --no-deps --all-features -p axlewire --target-dir "$target/web" &&
+    cp -r "$target/web/doc" "$out/doc")
 ls -l "$out"

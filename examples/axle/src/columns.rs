@@ -168,12 +168,8 @@ impl Capture {
         let (mut sheet, mut theirs) = (Sheet::new(None), None);
         sheet.kept = Some(Kept::default());
         let walked = self.chosen.walk(&mut self.input, &mut sheet, |_, sheet| {
-            let kept = sheet.kept.as_ref();
-            if let Some(full) = kept.filter(|kept| kept.is_full) {
-                let line = format!("no memory for more than {} frames and gaps", full.len());
-                return Err(Failure::Failed(line));
-            }
-            go_on().map_err(|error| {
+            let full = sheet.kept.as_ref().filter(|kept| kept.is_full);
+            full.map_or_else(&mut go_on, |kept| Err(no_memory(kept.len()))).map_err(|error| {
                 theirs = Some(error);
                 Failure::Failed(String::new())
             })
@@ -181,9 +177,15 @@ impl Capture {
         if let Some(error) = theirs {
             return Err(error);
         }
-        let rows = Rows::new(sheet.kept.unwrap_or_default(), self.chosen.has_times);
-        Ok((rows, Summary::of(walked?)))
+        let kept = sheet.kept.unwrap_or_default();
+        let (is_full, len) = (kept.is_full, kept.len());
+        let (rows, summary) = (Rows::new(kept, self.chosen.has_times), Summary::of(walked?));
+        if is_full { Err(no_memory(len)) } else { Ok((rows, summary)) }
     }
+}
+
+fn no_memory(rows: usize) -> Error {
+    Error::Capture(format!("there is no memory for more than {rows} frames and gaps"))
 }
 
 impl Summary {

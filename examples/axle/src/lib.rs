@@ -4,6 +4,10 @@
 //! that distinguishes usage errors from other failures.
 //!
 //! In a browser, where there is no system, it only reads captures.
+#![cfg_attr(
+    target_family = "wasm",
+    allow(dead_code, unused_imports, unused_variables, reason = "the commands are not there")
+)]
 
 mod args;
 #[cfg(not(target_family = "wasm"))]

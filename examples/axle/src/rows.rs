@@ -71,6 +71,21 @@ impl Rows {
         sheet.out.0
     }
 
+    /// Of these rows, those of which the line has this text; upper and lower case of ASCII are
+    /// alike.
+    #[must_use]
+    pub fn with_text(&self, rows: impl IntoIterator<Item = usize>, text: &str) -> Vec<usize> {
+        let text = text.to_ascii_lowercase();
+        let mut sheet = Sheet::new(Some(Style::Json));
+        let has_text = |row: &usize| {
+            sheet.out.0.clear();
+            self.list(*row, &mut sheet);
+            sheet.out.0.make_ascii_lowercase();
+            str::from_utf8(&sheet.out.0).is_ok_and(|line| line.contains(&text))
+        };
+        rows.into_iter().filter(has_text).collect()
+    }
+
     /// The columns of a table, without rows.
     #[must_use]
     pub fn columns(&self, table: usize) -> Vec<Column> {

@@ -17,11 +17,19 @@ function showView(): void {
   }
 }
 
+/** Whatever fails, the next picture is drawn: it says how far a stop has come. */
 function draw(): void {
+  requestAnimationFrame(draw);
   trial.draw();
   line.draw();
   stopping.showStop();
-  requestAnimationFrame(draw);
+}
+
+/** On a site with the docs beside it. */
+const docs: unknown = import.meta.env.VITE_DOCS;
+if (typeof docs === "string" && docs !== "") {
+  the("to-docs", HTMLElement).setAttribute("href", docs);
+  show(the("to-docs", HTMLElement), true);
 }
 
 showView();

@@ -169,6 +169,8 @@ pub(crate) trait Stream {
 /// A stream of frames that this framing finds.
 pub(crate) struct StreamOf<F> {
     decoder: Decoder<F, BUFFER_LEN>,
+    /// Offset of its first byte.
+    first: u64,
     /// Place of the next event; only its offset changes.
     place: Place,
     /// The last gap, held back: at the end of the input a second gap may follow directly, and the
@@ -187,15 +189,13 @@ where
 {
     /// A stream whose first byte has this offset.
     pub(super) fn new(offset: u64) -> Self {
-        let place = Place { offset, ..Place::default() };
-        let decoder = Decoder::new();
-        let booked = Counters::default();
-        Self { decoder, place, gap: None, booked, chunks: VecDeque::new() }
+        Self::at(Place { offset, ..Place::default() })
     }
 
     /// A stream whose first byte is at this place; its time does not matter.
     pub(super) fn at(place: Place) -> Self {
-        Self { place, ..Self::new(0) }
+        let (decoder, booked) = (Decoder::new(), Counters::default());
+        Self { decoder, first: place.offset, place, gap: None, booked, chunks: VecDeque::new() }
     }
 
     fn drain(&mut self, bytes: &mut &[u8], sheet: &mut Sheet) {
@@ -242,13 +242,13 @@ where
 {
     fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet) {
         if let Some(micros) = micros {
-            let end = self.decoder.received() + bytes.len() as u64;
+            let end = self.first + self.decoder.received() + bytes.len() as u64;
             self.chunks.push_back((end, micros));
         }
         self.drain(&mut &*bytes, sheet);
         // The next event ends with the last decided byte at the earliest. A gap may be endless, so
         // what is before is not kept.
-        let decided = self.decoder.received() - self.decoder.pending() as u64;
+        let decided = self.first + self.decoder.received() - self.decoder.pending() as u64;
         forget_before(&mut self.chunks, decided);
     }
 
