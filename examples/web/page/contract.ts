@@ -1,4 +1,4 @@
-/** What the JSON of the wasm package says (see API.md). */
+/** What the JSON of the wasm package says. */
 
 export type StopProgress =
   "not_asked" | "owed" | "confirmed" | "standing_still" | "still_moving" | "no_reports";

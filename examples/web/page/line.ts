@@ -46,6 +46,8 @@ let watch: Watch | undefined;
 /** What was watched, as pcapng; it is there until the port is used again. */
 let recording: Blob[] = [];
 let isBusy = false;
+/** The port is closed as soon as everything is seen to stand still. */
+let isClosing = false;
 
 const protocol = (): "ucp" | "ikeya" | "ikeya-3" =>
   select("line-protocol").value as "ucp" | "ikeya" | "ikeya-3";
@@ -225,7 +227,22 @@ function clear(): void {
   recording = [];
 }
 
+/** Stops first; asked for again, it closes whatever still moves. */
+async function close(): Promise<void> {
+  if (machine?.isArmed) {
+    isClosing = true;
+    machine.disarm("Closing: all motors are told to stop.");
+    say(words, "The port is closed as soon as everything is seen to stand still.");
+    return;
+  }
+  const isPending = machine?.isStopPending ?? false;
+  await end();
+  if (isPending)
+    warn("The port was closed before everything was seen to stand still: a motor may be moving.");
+}
+
 async function end(): Promise<void> {
+  isClosing = false;
   if (machine) {
     unguard(machine);
     const { session } = machine;
@@ -247,6 +264,7 @@ async function end(): Promise<void> {
 function setArmed(isArmed: boolean): void {
   if (!machine) return;
   if (isArmed) {
+    isClosing = false;
     machine.isArmed = true;
     machine.story.tell("Armed by hand.");
   } else {
@@ -259,6 +277,7 @@ export function draw(): void {
   const isArmed = machine?.isArmed ?? false;
   if (machine) machine.show();
   const isPending = machine?.isStopPending ?? false;
+  if (isClosing && machine && !isPending) void end();
   arm.setAttribute("aria-checked", String(isArmed));
   say(
     armWords,
@@ -275,7 +294,7 @@ export function draw(): void {
     isPending
       ? "Close although a stop is pending"
       : isArmed
-        ? "Close although armed"
+        ? "Stop, and close the port"
         : "Close the port",
   );
 }
@@ -287,7 +306,7 @@ export function start(): void {
   button("line-listen").addEventListener("click", () => void busy(listen));
   button("line-watch").addEventListener("click", () => void busy(beginWatch));
   button("line-connect").addEventListener("click", () => void connect());
-  button("line-close").addEventListener("click", () => void end());
+  button("line-close").addEventListener("click", () => void close());
   button("watch-save").addEventListener("click", () => {
     if (watch) collect(watch);
     download(

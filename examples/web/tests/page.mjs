@@ -480,6 +480,47 @@ async function aRealLineScanArmSpinStopUnplug() {
   await close(page);
 }
 
+async function closingStopsFirst() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const page = await scanned(simulator);
+  const closing = page.locator("#line-close");
+  const run = async () => {
+    await page.locator("#line-arm").click();
+    await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+    await until(() => turns(simulator) > 0.9, "the motor runs");
+  };
+  await run();
+  await says(closing, "Stop, and close the port");
+  await closing.click();
+  await says(page.locator("#line-words"), "The port is closed.");
+  assert.ok(Math.abs(turns(simulator)) < 0.1, "it was stopped before");
+  await page.locator("#line-connect").click();
+  await says(page.locator("#line-cards"), "Motor 1", 10_000);
+  await run();
+  simulator.unplug(1, true);
+  await closing.click();
+  await says(closing, "Close although a stop is pending");
+  await closing.click();
+  await says(page.locator("#line-alarm"), "a motor may be moving");
+  await close(page);
+}
+
+async function theDeadManDisarms() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const page = await open("#line", { serial: simulator });
+  await page.locator("#line-choose").click();
+  await page.locator("#line-dead-man").selectOption("2");
+  await page.locator("#line-connect").click();
+  await says(page.locator("#line-cards"), "Motor 1", 10_000);
+  await page.locator("#line-arm").click();
+  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await until(() => turns(simulator) > 0.9, "the motor runs");
+  await says(page.locator("#line-story"), "nobody has touched anything", 5000);
+  await says(page.locator("#line-arm-words"), "Disarmed");
+  await until(() => Math.abs(turns(simulator)) < 0.05, "the motor stands");
+  await close(page);
+}
+
 async function aHiddenPageStops() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   const page = await scanned(simulator);
@@ -685,6 +726,8 @@ const stories = [
   hostileFilesAreNoTrouble,
   decodingIsCancelled,
   aRealLineScanArmSpinStopUnplug,
+  closingStopsFirst,
+  theDeadManDisarms,
   aHiddenPageStops,
   aClosedPageStopsAndWarns,
   theFakePlugIsPulledInEachState,
