@@ -27,7 +27,10 @@ function noWasmFile(): Plugin {
   };
 }
 
-/** Script and style go into index.html, and a policy that allows these, by their hashes, and no network. */
+/**
+ * Script and style go into index.html, and a policy that allows these, by their hashes, and no
+ * network.
+ */
 function oneFile(): Plugin {
   const hash = (text: string) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
   return {

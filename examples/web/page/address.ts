@@ -12,7 +12,10 @@ export function settings(): URLSearchParams {
   return new URLSearchParams(location.hash.split("?")[1] ?? "");
 }
 
-/** Writes what the view shows into the address, without a new step in the history. Empty values are left out. */
+/**
+ * Writes what the view shows into the address, without a new step in the history. Empty values are
+ * left out.
+ */
 export function remember(changes: Record<string, string>): void {
   const all = settings();
   for (const [name, value] of Object.entries(changes)) {

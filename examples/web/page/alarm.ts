@@ -1,4 +1,7 @@
-/** A timer that keeps time in a hidden page too: there, the page's own timers run once per second or minute, a worker's do not. */
+/**
+ * A timer that keeps time in a hidden page too: there, the page's own timers run once per second or
+ * minute, a worker's do not.
+ */
 import AlarmWorker from "./alarm_worker.ts?worker&inline";
 
 export class Alarm {

@@ -1,4 +1,7 @@
-/** The second view: a file is decoded, listed, filtered, plotted and exported. Nothing of it leaves this computer. */
+/**
+ * The second view: a file is decoded, listed, filtered, plotted and exported. Nothing of it leaves
+ * this computer.
+ */
 import { remember, settings } from "./address.ts";
 import { CaptureFile, type Contents } from "./capture_file.ts";
 import {

@@ -1,4 +1,7 @@
-/** A disc with a mark that turns as a motor does. It is a picture only: the words beside it say the same. */
+/**
+ * A disc with a mark that turns as a motor does. It is a picture only: the words beside it say the
+ * same.
+ */
 import { make } from "./dom.ts";
 
 const CALM_MS = 500;

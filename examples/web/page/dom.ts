@@ -1,4 +1,6 @@
-/** The few ways in which this page changes what is seen. Text is always set as text, never as HTML. */
+/**
+ * The few ways in which this page changes what is seen. Text is always set as text, never as HTML.
+ */
 
 type Attributes = Record<string, string>;
 

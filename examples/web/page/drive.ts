@@ -13,7 +13,10 @@ const LINK_WORDS: Record<RoverState["link"], string> = {
   down: "the rover is silent",
 };
 
-/** Of a report, what tells how the rover is: in words, its field, the unit, and how much of the unit the field counts. */
+/**
+ * Of a report, what tells how the rover is: in words, its field, the unit, and how much of the unit
+ * the field counts.
+ */
 const REPORTED: [string, string, string, number][] = [
   ["Wheels say", "rpm", "1/min", 1],
   ["Battery", "battery_pct", "%", 1],

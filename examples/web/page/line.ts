@@ -1,4 +1,7 @@
-/** The third view: a real line, by Web Serial. Listening never sends; moving needs the switch "Armed". */
+/**
+ * The third view: a real line, by Web Serial. Listening never sends; moving needs the switch
+ * "Armed".
+ */
 import type { Guess, Summary } from "./contract.ts";
 import {
   button,
@@ -24,7 +27,10 @@ const BAUD = { ucp: 115_200, ikeya: 500_000 };
 const LISTEN_MS = 1000;
 const WATCH_MS = 100;
 const LINES_SEEN = 100;
-/** Pieces of a recording are joined when they are so many, so that the browser may keep them on disk. */
+/**
+ * Pieces of a recording are joined when they are so many, so that the browser may keep them on
+ * disk.
+ */
 const PIECES = 256;
 
 const places = { cards: the("line-cards", HTMLElement), refused: the("line-refused", HTMLElement) };

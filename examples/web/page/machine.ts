@@ -1,5 +1,6 @@
 /**
- * A session with motors, of a bus or of a rover: what the page needs to show it, to stop it and to know when it is safe.
+ * A session with motors, of a bus or of a rover: what the page needs to show it, to stop it and to
+ * know when it is safe.
  * A simulated one cannot hurt anybody: it is always armed.
  */
 import { busStopWords, type BusSession, Motors, pendingStops } from "./motors.ts";

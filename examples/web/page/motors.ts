@@ -1,4 +1,7 @@
-/** A bus of motors: what each of them reports, how far its stop has come, and the orders that it can be given. */
+/**
+ * A bus of motors: what each of them reports, how far its stop has come, and the orders that it can
+ * be given.
+ */
 import {
   type BusNode,
   type BusState,
@@ -21,7 +24,9 @@ const HEALTH_WORDS: Record<BusNode["health"], string> = {
   unknown: "not heard yet",
 };
 
-/** What a person can mean. The crate takes any number, and what a motor can do is not known here. */
+/**
+ * What a person can mean. The crate takes any number, and what a motor can do is not known here.
+ */
 const LIMITS = { min: "-50", max: "50" };
 
 /** The cards of a bus, one for each node that was heard. */

@@ -1,4 +1,7 @@
-/** Plots of the numbers of a capture, by uPlot. What is zoomed into is asked for again, in full detail. */
+/**
+ * Plots of the numbers of a capture, by uPlot. What is zoomed into is asked for again, in full
+ * detail.
+ */
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { remember, settings } from "./address.ts";
@@ -36,7 +39,10 @@ const theTable = (): Table | undefined =>
 const unitOf = ({ unit }: Column): string => (unit === "none" ? "" : unit);
 const number = (text: string | null): number => (text === null ? NaN : Number.parseFloat(text));
 
-/** How much somebody wants to see a table at first: what is measured before what is ordered, gaps last. */
+/**
+ * How much somebody wants to see a table at first: what is measured before what is ordered, gaps
+ * last.
+ */
 const tells = (table: Table): number =>
   /report|response/.test(table.table) ? 2 : table.table === GAPS ? 0 : 1;
 
@@ -117,7 +123,8 @@ async function draw(): Promise<void> {
   plot?.destroy();
   plot = undefined;
   if (!data?.[0]) return;
-  // Of fewer rows than half of those asked for, none was left out: only then, a row has the values of one node.
+  // Of fewer rows than half of those asked for, none was left out: only then, a row has the values
+  // of one node.
   const isWhole = data[0].length < MOST_POINTS / 2;
   say(note, hasNodes && !isWhole ? "Too many rows to tell the nodes apart: look closer." : "");
   const curves = columns.flatMap((column, at) =>

@@ -2,7 +2,10 @@
 import { make } from "./dom.ts";
 
 export const ROW_PX = 24;
-/** Browsers cap the height of an element, some at 17 million pixels: a longer list is scrolled by shares. */
+/**
+ * Browsers cap the height of an element, some at 17 million pixels: a longer list is scrolled by
+ * shares.
+ */
 const MOST_PX = 15_000_000;
 
 export class Rows {

@@ -15,7 +15,10 @@ interface Serial extends EventTarget {
 
 export const serial: Serial | undefined = (navigator as { serial?: Serial }).serial;
 
-/** Twice this long: a page that was held up by a question of the browser hears of its port in between. */
+/**
+ * Twice this long: a page that was held up by a question of the browser hears of its port in
+ * between.
+ */
 const WRITE_MS = 500;
 
 export class SerialTransport implements Transport {
@@ -40,7 +43,9 @@ export class SerialTransport implements Transport {
     this.reading = this.read();
   }
 
-  /** A port that takes nothing for a second is given up: what it holds must not move a motor later. */
+  /**
+   * A port that takes nothing for a second is given up: what it holds must not move a motor later.
+   */
   async write(bytes: Uint8Array): Promise<void> {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const late = new Promise<never>((_, reject) => {
@@ -69,7 +74,10 @@ export class SerialTransport implements Transport {
     await this.port.close().catch(() => {});
   }
 
-  /** A framing error or a full buffer ends a stream, and the port then has a new one; an unplugged port has none. */
+  /**
+   * A framing error or a full buffer ends a stream, and the port then has a new one; an unplugged
+   * port has none.
+   */
   private async read(): Promise<void> {
     while (this.port.readable && !this.isClosing) {
       this.reader = this.port.readable.getReader();

@@ -1,5 +1,6 @@
 /**
- * One conversation on one line: a role of the crate (the master of a bus, the host of a rover) and a transport.
+ * One conversation on one line: a role of the crate (the master of a bus, the host of a rover) and
+ * a transport.
  * The role decides what is sent and when; this file only carries bytes.
  */
 import { Alarm } from "./alarm.ts";
@@ -79,8 +80,10 @@ export class Session<R extends Role, State> {
   }
 
   /**
-   * The page is about to end, or to stand still for a question of the browser. The stops that are due next are handed
-   * to the port without waiting for it; what the line does meanwhile cannot be heard, so an answer that is due is given up.
+   * The page is about to end, or to stand still for a question of the browser. The stops that are
+   * due next are handed
+   * to the port without waiting for it; what the line does meanwhile cannot be heard, so an answer
+   * that is due is given up.
    */
   stopWithoutWaiting(): void {
     if (this.closedBecause !== undefined) return;

@@ -1,4 +1,6 @@
-/** A simulated line, in a worker, as a transport. The worker also tells what the motors really do. */
+/**
+ * A simulated line, in a worker, as a transport. The worker also tells what the motors really do.
+ */
 import type { Truth } from "./contract.ts";
 import type { Transport } from "./session.ts";
 import SimulatorWorker from "./simulator_worker.ts?worker&inline";

@@ -1,4 +1,7 @@
-/** The stop that is always at hand: the bar, the space bar, and what happens when the page is hidden or closed. */
+/**
+ * The stop that is always at hand: the bar, the space bar, and what happens when the page is hidden
+ * or closed.
+ */
 import { button, say, show, the } from "./dom.ts";
 
 /** Something with motors in it. */
@@ -42,7 +45,10 @@ const takesText = (target: EventTarget | null): boolean =>
   target instanceof HTMLTextAreaElement ||
   (target instanceof HTMLInputElement && ["text", "search"].includes(target.type));
 
-/** The space bar stops, also where it would press a button, open a list or tick a box: for these there is the enter key. */
+/**
+ * The space bar stops, also where it would press a button, open a list or tick a box: for these
+ * there is the enter key.
+ */
 function key(event: KeyboardEvent): void {
   if (machines.size === 0 || takesText(event.target)) return;
   const isDown = event.type === "keydown" && !event.repeat;

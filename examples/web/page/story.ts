@@ -1,4 +1,7 @@
-/** The list of what happened on a line, newest first, and the same for a screen reader, but not more often than it can speak. */
+/**
+ * The list of what happened on a line, newest first, and the same for a screen reader, but not more
+ * often than it can speak.
+ */
 import type { RoleEvent } from "./contract.ts";
 import { make, say } from "./dom.ts";
 

@@ -1,4 +1,7 @@
-/** The first view: a simulated line. Motor 1 is running when the page opens, so that there is something to stop. */
+/**
+ * The first view: a simulated line. Motor 1 is running when the page opens, so that there is
+ * something to stop.
+ */
 import { remember, settings, view } from "./address.ts";
 import type { BusState, RoverState } from "./contract.ts";
 import { button, input, say, select, the } from "./dom.ts";

@@ -1,4 +1,7 @@
-/** The crate, compiled to WebAssembly: from the text in the page to a module that runs here and in workers. */
+/**
+ * The crate, compiled to WebAssembly: from the text in the page to a module that runs here and in
+ * workers.
+ */
 import init from "../pkg/axlewire_web.js";
 
 export { Bus, Listener, Rover, guess } from "../pkg/axlewire_web.js";

@@ -1,6 +1,7 @@
 // Drives the built page in headless Chromium, story by story.
 //   node tests/page.mjs INDEX_HTML SCREENSHOTS [CAPTURE] [PKG]
-// In the environment: CHROMIUM, STORY (a pattern for the stories to run), FIELD (a folder of more captures to open).
+// In the environment: CHROMIUM, STORY (a pattern for the stories to run), FIELD (a folder of more
+// captures to open).
 import assert from "node:assert/strict";
 import { mkdirSync, readdirSync, readFileSync } from "node:fs";
 import { createServer } from "node:http";

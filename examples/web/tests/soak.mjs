@@ -33,7 +33,12 @@ async function measured() {
   await inspector.send("HeapProfiler.collectGarbage");
   const { metrics } = await inspector.send("Performance.getMetrics");
   const of = (name) => metrics.find((it) => it.name === name).value;
-  return { heap: of("JSHeapUsedSize"), nodes: of("Nodes"), busy: of("TaskDuration"), at: of("Timestamp") };
+  return {
+    heap: of("JSHeapUsedSize"),
+    nodes: of("Nodes"),
+    busy: of("TaskDuration"),
+    at: of("Timestamp"),
+  };
 }
 
 await page.waitForTimeout(30_000);
