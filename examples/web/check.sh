@@ -10,10 +10,9 @@ cd "$(dirname "$0")"
 target=$(realpath -m "${CARGO_TARGET_DIR:-../../target}")
 page=$target/web/page shots=$target/web/screenshots
 cargo fmt --check
-npx --yes prettier@3.6.2 --print-width 100 --log-level warn --check \
-    index.html page tests vite.config.ts
 cargo clippy --quiet --target-dir "$target/web/host" -- -D warnings
 ./build.sh "$page"
+npx prettier --print-width 100 --log-level warn --check index.html page tests vite.config.ts
 if [ "${1-}" = --quick ]; then
     STORY='aMotorRuns|stopIsSeen|aCaptureIsListed' exec node tests/page.mjs "$page/index.html" "$shots"
 fi
