@@ -17,6 +17,7 @@ if [ "${1-}" = --quick ]; then
     STORY='aMotorRuns|stopIsSeen|aCaptureIsListed' exec node tests/page.mjs "$page/index.html" "$shots"
 fi
 cargo build --quiet --release -p axle --manifest-path ../../Cargo.toml --target-dir "$target"
+node tests/roles.mjs
 node tests/values.mjs "$target/release/axle" "$target/web/scratch"
 node tests/page.mjs "$page/index.html" "$shots"
 node tests/speed.mjs "$target/release/axle" "$target/web/scratch" "$page/index.html"

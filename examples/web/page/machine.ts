@@ -5,7 +5,7 @@
  */
 import { busStopWords, type BusSession, Motors, pendingStops } from "./motors.ts";
 import { Drive, isStopPending, type RoverSession, roverStopWords } from "./drive.ts";
-import type { RoverState, Simulation } from "./contract.ts";
+import type { Simulation } from "./contract.ts";
 import { say, show } from "./dom.ts";
 import { Session, type Transport } from "./session.ts";
 import type { Machine } from "./stopping.ts";
@@ -69,7 +69,7 @@ export class MovingMachine implements Machine {
       new Rover(deadMan, performance.now()),
       transport,
       (rover, now) => rover.stop(now),
-      stillDrive,
+      (rover, now) => rover.keep_alive(now),
     );
     const drive = new Drive(places.cards, session, (why) => refuse(places, why), simulation);
     const picture = (mayMove: boolean) => {
@@ -117,13 +117,6 @@ export class MovingMachine implements Machine {
   words(): string {
     return `${this.isSimulated ? "Simulation" : "The line"}: ${this.stopWords}`;
   }
-}
-
-/** The host of a rover wants its orders again: the one that is in force, if one is. */
-function stillDrive(rover: Rover, now: number): void {
-  const { command, stop } = JSON.parse(rover.state(now)) as RoverState;
-  if (command && stop === "not_asked" && (command.speed !== 0 || command.angular !== 0))
-    rover.drive(command.speed, command.angular, now);
 }
 
 function refuse(places: Places, why: string): void {

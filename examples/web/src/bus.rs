@@ -24,7 +24,11 @@ const PERIOD: Duration = Duration::from_millis(25);
 
 /// A master with boards of one motor.
 #[wasm_bindgen]
-pub struct Bus(Session<Master>);
+pub struct Bus {
+    session: Session<Master>,
+    /// Somebody has stopped all: what is found later is stopped too.
+    is_stopped: bool,
+}
 
 #[wasm_bindgen]
 impl Bus {
@@ -38,55 +42,59 @@ impl Bus {
         config.dead_man = Some(span(dead_man_ms));
         // The clock of a page has steps of 100 µs.
         config.accepts_early = true;
-        Self(Session::new(Master::new(config, instant(now)), now))
+        let session = Session::new(Master::new(config, instant(now)), now);
+        Self { session, is_stopped: false }
     }
 
     /// Takes in what was received.
     pub fn receive(&mut self, bytes: &[u8], now: f64) {
-        self.0.receive(bytes, now);
+        self.session.receive(bytes, now);
     }
 
     /// The next packet to write, if one is due. Call it again until there is none.
     pub fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
-        self.0.transmit(now)
+        self.catch_up(now);
+        self.session.transmit(now)
     }
 
     /// What has become of a packet.
     pub fn sent(&mut self, ok: bool, now: f64) {
-        self.0.sent(ok, now);
+        self.session.sent(ok, now);
     }
 
     /// Milliseconds until `transmit` is to be called, even if nothing is received.
     pub fn wait(&self, now: f64) -> Option<f64> {
-        self.0.wait(now)
+        self.session.wait(now)
     }
 
     /// Asks all ids.
     pub fn discover(&mut self, now: f64) {
-        self.0.role.discover(instant(now));
+        self.session.role.discover(instant(now));
     }
 
     /// Turns a motor, turns per second.
     pub fn set_velocity(&mut self, node: u8, rps: f32, now: f64) -> Result<(), JsError> {
         let target = Rps::new(rps).map_err(thrown)?;
-        self.0.role.set_velocity(id(node)?, target, instant(now)).map_err(thrown)
+        self.session.role.set_velocity(id(node)?, target, instant(now)).map_err(thrown)
     }
 
     /// Moves a motor there, turns.
     pub fn set_position(&mut self, node: u8, turns: f64, now: f64) -> Result<(), JsError> {
         let target = Position::from_revolutions(turns).map_err(thrown)?;
-        self.0.role.set_position(id(node)?, target, instant(now)).map_err(thrown)
+        self.session.role.set_position(id(node)?, target, instant(now)).map_err(thrown)
     }
 
     /// Stops a motor; the stop is repeated until the motor is seen to stand still.
     pub fn stop(&mut self, node: u8, now: f64) -> Result<(), JsError> {
-        self.0.role.stop(id(node)?, instant(now));
+        self.session.role.stop(id(node)?, instant(now));
         Ok(())
     }
 
-    /// Stops all that were heard, or are owed a stop. Before any was heard: all ids.
+    /// Stops all that were heard, or are owed a stop; before any was heard, all ids. Those that are
+    /// found later are stopped then.
     pub fn stop_all(&mut self, now: f64) {
-        let role = &mut self.0.role;
+        self.is_stopped = true;
+        let role = &mut self.session.role;
         let known = |node: &NodeId| role.mode(*node).is_some() || role.stops_owed().contains(*node);
         let nodes: Vec<_> = NodeId::ALL.into_iter().filter(known).collect();
         match &*nodes {
@@ -95,14 +103,15 @@ impl Bus {
         }
     }
 
-    /// Somebody is there.
+    /// Somebody is there; if that comes too late, the dead-man has fired before.
     pub fn keep_alive(&mut self, now: f64) {
-        self.0.role.keep_alive(instant(now));
+        self.catch_up(now);
+        self.session.role.keep_alive(instant(now));
     }
 
     /// What the master knows.
     pub fn state(&self, now: f64) -> String {
-        let role = &self.0.role;
+        let role = &self.session.role;
         let nodes: Vec<_> = NodeId::ALL.into_iter().map(|node| self.node(node, now)).collect();
         let owed: Vec<_> = role.stops_owed().iter().map(NodeId::get).collect();
         let coasting: Vec<_> = role.coasting().iter().map(NodeId::get).collect();
@@ -126,13 +135,25 @@ impl Bus {
 
     /// What has happened since the last call.
     pub fn events(&mut self) -> String {
-        let events = std::mem::take(&mut self.0.events);
+        let events = std::mem::take(&mut self.session.events);
         json!(events.iter().filter_map(|(t, event)| told(*t, event)).collect::<Vec<_>>())
             .to_string()
     }
 
+    fn catch_up(&mut self, now: f64) {
+        let heard_before = self.session.events.len();
+        self.session.catch_up(now);
+        if self.is_stopped {
+            for (_, event) in self.session.events.iter().skip(heard_before) {
+                if let MasterEvent::Discovered { node, .. } = event {
+                    self.session.role.stop(*node, instant(now));
+                }
+            }
+        }
+    }
+
     fn node(&self, node: NodeId, now: f64) -> Value {
-        let role = &self.0.role;
+        let role = &self.session.role;
         let (velocity, position, age) = match role.status(node) {
             Some((Status::Velocity(rps), at)) => (Some(rps), None, Some(at)),
             Some((Status::Position(at_turns), at)) => {

@@ -79,6 +79,18 @@ impl Rover {
         role.drive(command.with_front_led(on), instant(now)).map_err(thrown)
     }
 
+    /// Somebody is there: a command that is still in force goes on. If that comes too late, the
+    /// dead-man has fired before.
+    pub fn keep_alive(&mut self, now: f64) {
+        self.session.catch_up(now);
+        let role = &mut self.session.role;
+        let moving = role.command().filter(|command| !command.stands_still());
+        if let Some(command) = moving.filter(|_| role.stop_progress() == StopProgress::NotAsked) {
+            // Refused if the rover is not heard: then it was told to stop.
+            let _ = role.drive(command, instant(now));
+        }
+    }
+
     /// Stops; the stop is repeated.
     pub fn stop(&mut self, now: f64) {
         self.session.role.stop(instant(now));

@@ -42,17 +42,22 @@ impl<R: Endpoint> Session<R> {
         self.turn = now;
     }
 
-    /// The next frame to write, if one is due.
-    pub(crate) fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
+    /// What was due by now happens, such as a dead-man.
+    pub(crate) fn catch_up(&mut self, now: f64) {
         let at = instant(now);
-        self.turn = at;
         if self.role.poll_timeout().is_some_and(|timeout| timeout <= at) {
             self.role.handle_timeout(at);
         }
         while let Some(event) = self.role.poll_event() {
             self.events.push((now, event));
         }
-        self.role.poll_transmit(at).map(<[u8]>::to_vec)
+    }
+
+    /// The next frame to write, if one is due.
+    pub(crate) fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
+        self.turn = instant(now);
+        self.catch_up(now);
+        self.role.poll_transmit(self.turn).map(<[u8]>::to_vec)
     }
 
     /// A frame was written, or nobody knows how much of it.

@@ -1,0 +1,83 @@
+// The roles as the page has them, without a page: what a page that was held up may not do.
+//
+//   node tests/roles.mjs
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+
+import { Bus, initSync, Rover, Simulator } from "../pkg/axlewire_web.js";
+
+initSync({ module: readFileSync(new URL("../pkg/axlewire_web_bg.wasm", import.meta.url)) });
+
+/** Serves a line for so long, a millisecond at a time. */
+function serve(role, simulator, from, ms) {
+  for (let now = from; now < from + ms; now += 1) {
+    for (let frame; (frame = role.transmit(now));) simulator.write(frame, now);
+    role.receive(simulator.read(now), now);
+  }
+  return from + ms;
+}
+
+/** Only the other end goes on: the page was held up. */
+function hold(simulator, from, ms) {
+  for (let now = from; now < from + ms; now += 1) simulator.read(now);
+  return from + ms;
+}
+
+const state = (role, now) => JSON.parse(role.state(now));
+
+{
+  const simulator = Simulator.rover(1, 0);
+  const rover = new Rover(500, 0);
+  let now = serve(rover, simulator, 0, 1000);
+  rover.drive(50, 0, now);
+  now = hold(simulator, serve(rover, simulator, now, 300), 2000);
+  rover.keep_alive(now);
+  assert.equal(state(rover, now).command.speed, 0, "a person who comes late starts nothing again");
+  now = serve(rover, simulator, now, 4000);
+  assert.equal(state(rover, now).stop, "standing_still");
+  rover.drive(50, 0, now);
+  for (let part = 0; part < 20; part += 1) {
+    now = serve(rover, simulator, now, 300);
+    rover.keep_alive(now);
+  }
+  assert.equal(state(rover, now).command.speed, 50, "a person who is there keeps it going");
+  assert.match(rover.events(), /dead_man/);
+}
+
+{
+  const simulator = Simulator.bus("1:velocity", 1, 0);
+  const bus = new Bus(500_000, 500, 0);
+  bus.discover(0);
+  let now = serve(bus, simulator, 0, 2000);
+  bus.set_velocity(1, 1, now);
+  now = hold(simulator, serve(bus, simulator, now, 300), 2000);
+  bus.keep_alive(now);
+  now = serve(bus, simulator, now, 3000);
+  assert.equal(state(bus, now).nodes[0].stop, "standing_still", "the dead-man was not put off");
+  assert.match(bus.events(), /dead_man/);
+  assert.throws(() => bus.set_velocity(9, 1, now), /9/);
+  assert.throws(() => bus.set_velocity(1, NaN, now), Error);
+}
+
+{
+  const simulator = Simulator.bus("1:velocity 8:velocity", 1, 0);
+  const other = new Bus(500_000, 600_000, 0);
+  other.discover(0);
+  let now = serve(other, simulator, 0, 2000);
+  other.set_velocity(8, 1, now);
+  now = serve(other, simulator, now, 2000);
+  const bus = new Bus(500_000, 600_000, now);
+  bus.discover(now);
+  while (state(bus, now).nodes[0].mode === null) now = serve(bus, simulator, now, 1);
+  assert.equal(state(bus, now).nodes[7].mode, null, "it is not found yet");
+  bus.stop_all(now);
+  now = serve(bus, simulator, now, 5000);
+  assert.equal(
+    state(bus, now).nodes[7].stop,
+    "standing_still",
+    "a STOP holds for what is found later",
+  );
+  assert.ok(Math.abs(JSON.parse(simulator.state()).nodes[1].rps) < 0.05);
+}
+
+console.log("the roles of the page: a late sign of life puts no dead-man off");
