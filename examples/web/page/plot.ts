@@ -7,11 +7,12 @@ import "uplot/dist/uPlot.min.css";
 import { remember, settings } from "./address.ts";
 import type { CaptureFile, Contents } from "./capture_file.ts";
 import type { Column, Table } from "./contract.ts";
-import { button, make, say, select, the } from "./dom.ts";
+import { button, make, select, the } from "./dom.ts";
 import { clock, GAPS } from "./frames.ts";
 
 const HEIGHT = 300;
-const MOST_POINTS = 200_000;
+/** Nodes on a bus: each has a curve of its own. */
+const MOST_NODES = 8;
 const NOT_PLOTTED = new Set(["t", "offset", "interface", "length"]);
 /** The column that tells the motors of a bus apart. */
 const NODE = "node";
@@ -19,7 +20,6 @@ const DASHES = [[], [8, 4], [2, 3], [12, 3, 2, 3]];
 
 const place = the("plot", HTMLElement);
 const choice = the("plot-columns", HTMLElement);
-const note = the("plot-note", HTMLElement);
 const tableChoice = select("plot-table");
 const isDark = matchMedia("(prefers-color-scheme: dark)");
 
@@ -111,7 +111,7 @@ async function draw(): Promise<void> {
   const mine = ++drawn;
   const names = columns.map(({ name }) => name);
   const hasNodes = theTable()?.columns.some(({ name }) => name === NODE) && !names.includes(NODE);
-  const points = hasNodes ? MOST_POINTS : 2 * Math.max(300, place.clientWidth);
+  const points = (hasNodes ? MOST_NODES : 1) * 2 * Math.max(300, place.clientWidth);
   const asked = hasNodes ? [...names, NODE] : names;
   const data =
     columns.length > 0
@@ -123,15 +123,11 @@ async function draw(): Promise<void> {
   plot?.destroy();
   plot = undefined;
   if (!data?.[0]) return;
-  // Of fewer rows than half of those asked for, none was left out: only then, a row has the values
-  // of one node.
-  const isWhole = data[0].length < MOST_POINTS / 2;
-  say(note, hasNodes && !isWhole ? "Too many rows to tell the nodes apart: look closer." : "");
   const curves = columns.flatMap((column, at) =>
     curvesOf(
       column,
       data[at + 1] ?? new Float64Array(),
-      hasNodes && isWhole ? data[names.length + 1] : undefined,
+      hasNodes ? data[names.length + 1] : undefined,
     ),
   );
   plot = new uPlot(

@@ -42,7 +42,7 @@ impl Bus {
         config.dead_man = Some(span(dead_man_ms));
         // The clock of a page has steps of 100 µs.
         config.accepts_early = true;
-        let session = Session::new(Master::new(config, instant(now)), now);
+        let session = Session::new(Master::new(config, instant(now)), told, now);
         Self { session, is_stopped: false }
     }
 
@@ -135,19 +135,15 @@ impl Bus {
 
     /// What has happened since the last call.
     pub fn events(&mut self) -> String {
-        let events = std::mem::take(&mut self.session.events);
-        json!(events.iter().filter_map(|(t, event)| told(*t, event)).collect::<Vec<_>>())
-            .to_string()
+        self.session.events()
     }
 
     fn catch_up(&mut self, now: f64) {
-        let heard_before = self.session.events.len();
-        self.session.catch_up(now);
-        if self.is_stopped {
-            for (_, event) in self.session.events.iter().skip(heard_before) {
-                if let MasterEvent::Discovered { node, .. } = event {
-                    self.session.role.stop(*node, instant(now));
-                }
+        for event in self.session.catch_up(now) {
+            if let MasterEvent::Discovered { node, .. } = event
+                && self.is_stopped
+            {
+                self.session.role.stop(node, instant(now));
             }
         }
     }

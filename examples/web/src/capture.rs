@@ -1,6 +1,9 @@
 //! A capture: decoded as a whole, then shown in parts.
 
-use std::io::{self, Read};
+use std::{
+    collections::BTreeSet,
+    io::{self, Read},
+};
 
 use axle::{
     columns,
@@ -131,8 +134,9 @@ impl Capture {
     }
 
     /// Columns of a table for a plot: the times in seconds since 1970, or the offsets without
-    /// times; then the values of each column, NaN where there is none. Of more than some `points`
-    /// from `from` to `to`, the smallest and the largest of each stretch.
+    /// times; then the values of each column, NaN where there is none: whole rows in the order of
+    /// time. Of more than some `points` from `from` to `to`, those with the smallest and the
+    /// largest values of each stretch and node.
     pub fn series(
         &self,
         table: &str,
@@ -145,24 +149,25 @@ impl Capture {
             return Vec::new();
         };
         let (x, scale) = if self.rows.has_times() { ("t", 1e-6) } else { ("offset", 1.0) };
-        let mut all = vec![Vec::new(); columns.len() + 1];
+        let mut all = vec![Vec::new(); columns.len() + 2];
         self.rows.each_piece(table, 0..usize::MAX, |piece, _| {
             let find = |name: &str| piece.iter().find(|it| it.name == name);
-            let names = [x].into_iter().chain(columns.iter().map(|it| &**it));
+            let names = [x, "node"].into_iter().chain(columns.iter().map(|it| &**it));
             for (name, to) in names.zip(&mut all) {
                 to.extend(find(name).map(Column::numbers).unwrap_or_default());
             }
         });
-        let Some((times, values)) = all.split_first_mut() else { return Vec::new() };
+        let [times, nodes, values @ ..] = &mut *all else { return Vec::new() };
         times.iter_mut().for_each(|time| *time *= scale);
-        let is_within = |time: f64| !(time < from || time > to);
-        let kept = thinned(times, values, is_within, points.max(2));
+        let is_within = |time: f64| !(time.is_nan() || time < from || time > to);
+        let kept = thinned(times, nodes, values, is_within, points.max(2));
         let pick = |column: &Vec<f64>| {
             let picked: Vec<_> =
                 kept.iter().map(|at| column.get(*at).copied().unwrap_or(f64::NAN)).collect();
             Float64Array::from(&*picked)
         };
-        all.iter().map(pick).collect()
+        let of_nodes = 1;
+        all.iter().enumerate().filter(|(at, _)| *at != of_nodes).map(|(_, it)| pick(it)).collect()
     }
 
     /// Rows of a table as `axle export` writes them to CSV; the titles are in front of the first.
@@ -182,32 +187,40 @@ impl Capture {
     }
 }
 
-/// Which rows to draw, in their order: of each stretch, those with the smallest and the largest
-/// value of some column.
+/// Which rows to draw, in the order of time: of each stretch and node, those with the smallest and
+/// the largest value of some column.
 fn thinned(
     times: &[f64],
+    nodes: &[f64],
     columns: &[Vec<f64>],
     is_within: impl Fn(f64) -> bool,
     points: usize,
 ) -> Vec<usize> {
-    let within: Vec<_> =
-        times.iter().enumerate().filter(|(_, time)| is_within(**time)).map(|(at, _)| at).collect();
+    let value = |column: &[f64], at: usize| column.get(at).copied().unwrap_or(f64::NAN);
+    let time = |at: usize| value(times, at);
+    let mut within: Vec<_> = (0..times.len()).filter(|at| is_within(time(*at))).collect();
+    within.sort_by(|one, other| time(*one).total_cmp(&time(*other)));
     if within.len() <= points {
         return within;
     }
+    let node = |at: usize| value(nodes, at) as u8;
+    let known: BTreeSet<_> = within.iter().map(|at| node(*at)).collect();
+    let per_stretch = 2 * columns.len().max(1) * known.len().max(1);
     let mut kept = Vec::new();
-    let per_row = 2 * columns.len().max(1);
-    for stretch in within.chunks((within.len() * per_row).div_ceil(points)) {
-        let mut of_it: Vec<usize> = Vec::new();
-        for column in columns {
-            let value = |at: &usize| column.get(*at).copied().unwrap_or(f64::NAN);
-            let known = || stretch.iter().copied().filter(|at| !value(at).is_nan());
-            let by_value = |one: &usize, other: &usize| value(one).total_cmp(&value(other));
-            of_it.extend(known().min_by(by_value).into_iter().chain(known().max_by(by_value)));
+    for stretch in within.chunks((within.len() * per_stretch).div_ceil(points)) {
+        let mut of_it = BTreeSet::new();
+        for (column, known) in columns.iter().flat_map(|it| known.iter().map(move |id| (it, *id))) {
+            // By their places in the stretch, which are in the order of time.
+            let its = || {
+                let all = stretch.iter().copied().enumerate();
+                all.filter(|(_, at)| node(*at) == known && !value(column, *at).is_nan())
+            };
+            let by_value = |one: &(usize, usize), other: &(usize, usize)| {
+                value(column, one.1).total_cmp(&value(column, other.1))
+            };
+            of_it.extend(its().min_by(by_value).into_iter().chain(its().max_by(by_value)));
         }
-        of_it.sort_unstable();
-        of_it.dedup();
-        kept.extend(of_it);
+        kept.extend(of_it.into_iter().map(|(_, at)| at));
     }
     kept
 }

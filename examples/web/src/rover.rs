@@ -32,7 +32,7 @@ impl Rover {
     pub fn new(dead_man_ms: f64, now: f64) -> Self {
         let mut config = HostConfig::usb_adapter();
         config.dead_man = span(dead_man_ms);
-        let session = Session::new(Host::new(config, instant(now)), now);
+        let session = Session::new(Host::new(config, instant(now)), told, now);
         Self { session, round_trip_ms: None, reported: None }
     }
 
@@ -82,7 +82,7 @@ impl Rover {
     /// Somebody is there: a command that is still in force goes on. If that comes too late, the
     /// dead-man has fired before.
     pub fn keep_alive(&mut self, now: f64) {
-        self.session.catch_up(now);
+        drop(self.session.catch_up(now));
         let role = &mut self.session.role;
         let moving = role.command().filter(|command| !command.stands_still());
         if let Some(command) = moving.filter(|_| role.stop_progress() == StopProgress::NotAsked) {
@@ -135,9 +135,7 @@ impl Rover {
 
     /// What has happened since the last call.
     pub fn events(&mut self) -> String {
-        let events = std::mem::take(&mut self.session.events);
-        json!(events.iter().filter_map(|(t, event)| told(*t, event)).collect::<Vec<_>>())
-            .to_string()
+        self.session.events()
     }
 }
 

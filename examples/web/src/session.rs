@@ -1,17 +1,28 @@
 //! A role that a page drives.
 
+use std::collections::VecDeque;
+
 use axlewire::{
     endpoint::{Arrival, Endpoint, Unsent},
     time::{Duration, Instant},
 };
+use serde_json::{Value, json};
 
 /// A turn of the page's loop that comes so late that received bytes may have waited meanwhile.
 const LATE: Duration = Duration::from_millis(30);
 
+/// Events that a page may fetch late: a hidden one draws nothing.
+const MOST_EVENTS: usize = 1000;
+
+/// An event at a time as a sentence for people, if it is worth one.
+type Told<E> = fn(f64, &E) -> Option<Value>;
+
 /// A role, and what it has reported.
 pub(crate) struct Session<R: Endpoint> {
     pub(crate) role: R,
-    pub(crate) events: Vec<(f64, R::Event)>,
+    told: Told<R::Event>,
+    /// The latest.
+    events: VecDeque<Value>,
     /// The latest turn of the page's loop.
     turn: Instant,
 }
@@ -27,8 +38,8 @@ pub(crate) fn span(ms: f64) -> Duration {
 }
 
 impl<R: Endpoint> Session<R> {
-    pub(crate) fn new(role: R, now: f64) -> Self {
-        Self { role, events: Vec::new(), turn: instant(now) }
+    pub(crate) fn new(role: R, told: Told<R::Event>, now: f64) -> Self {
+        Self { role, told, events: VecDeque::new(), turn: instant(now) }
     }
 
     /// Takes in received bytes. If the page was held up, they may have waited.
@@ -42,22 +53,33 @@ impl<R: Endpoint> Session<R> {
         self.turn = now;
     }
 
-    /// What was due by now happens, such as a dead-man.
-    pub(crate) fn catch_up(&mut self, now: f64) {
+    /// What was due by now happens, such as a dead-man. Gives what has happened.
+    pub(crate) fn catch_up(&mut self, now: f64) -> Vec<R::Event> {
+        let mut all = Vec::new();
         let at = instant(now);
         if self.role.poll_timeout().is_some_and(|timeout| timeout <= at) {
             self.role.handle_timeout(at);
         }
         while let Some(event) = self.role.poll_event() {
-            self.events.push((now, event));
+            if let Some(told) = (self.told)(now, &event) {
+                self.events.truncate(MOST_EVENTS - 1);
+                self.events.push_front(told);
+            }
+            all.push(event);
         }
+        all
     }
 
     /// The next frame to write, if one is due.
     pub(crate) fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
         self.turn = instant(now);
-        self.catch_up(now);
+        drop(self.catch_up(now));
         self.role.poll_transmit(self.turn).map(<[u8]>::to_vec)
+    }
+
+    /// The latest events since the last call, the oldest first.
+    pub(crate) fn events(&mut self) -> String {
+        json!(self.events.drain(..).rev().collect::<Vec<_>>()).to_string()
     }
 
     /// A frame was written, or nobody knows how much of it.

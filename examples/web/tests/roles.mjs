@@ -80,4 +80,16 @@ const state = (role, now) => JSON.parse(role.state(now));
   assert.ok(Math.abs(JSON.parse(simulator.state()).nodes[1].rps) < 0.05);
 }
 
+{
+  const simulator = Simulator.bus("1:velocity", 1, 0);
+  const bus = new Bus(500_000, 600_000, 0);
+  bus.discover(0);
+  let now = 0;
+  for (let cycle = 0; cycle < 1000; cycle += 1) {
+    simulator.unplug(1, cycle % 2 === 0);
+    now = serve(bus, simulator, now, 400);
+  }
+  assert.equal(JSON.parse(bus.events()).length, 1000, "a hidden page keeps the latest events only");
+}
+
 console.log("the roles of the page: a late sign of life puts no dead-man off");
