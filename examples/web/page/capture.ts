@@ -47,8 +47,16 @@ const rows = new Rows(
   choose,
 );
 
+/** Ends what takes long. It ends the worker, so a capture that was open is decoded again. */
+function cancel(ready: Promise<WebAssembly.Module>): void {
+  const again = contents && capture;
+  capture?.end();
+  if (again) void ready.then((module) => open(module, again.file));
+}
+
 async function open(module: WebAssembly.Module, file: File): Promise<void> {
   capture?.end();
+  contents = undefined;
   const protocol = select("capture-protocol").value;
   const mine = new CaptureFile(file, module, protocol === "auto" ? undefined : protocol, working);
   capture = mine;
@@ -80,7 +88,8 @@ function idle(): void {
   show(button("capture-cancel"), false);
 }
 
-function sentence(name: string, { summary: { summary, cut }, tables, rows }: Contents): string {
+function sentence(name: string, { summary: all, tables, rows }: Contents): string {
+  const { summary, cut, notes } = all;
   const protocol = tables.find(({ table }) => table !== GAPS)?.table.split(".")[0] ?? "no frames";
   const reasons = Object.entries(summary.skipped_by)
     .filter(([, bytes]) => bytes > 0)
@@ -92,7 +101,7 @@ function sentence(name: string, { summary: { summary, cut }, tables, rows }: Con
   const back = summary.times_back
     ? ` The times go back ${counted(summary.times_back, "time")}.`
     : "";
-  return `${name}: ${protocol}, ${counted(summary.received, "byte")}, ${counted(summary.frames, "frame")}${skipped}. ${counted(rows, "row")}.${back}${cut === null ? "" : ` ${cut}`}`;
+  return `${name}: ${protocol}, ${counted(summary.received, "byte")}, ${counted(summary.frames, "frame")}${skipped}. ${counted(rows, "row")}.${back}${[...notes, cut ?? ""].map((note) => ` ${note}`).join("")}`.trim();
 }
 
 /** A box for each table, and the same tables for the export. */
@@ -203,7 +212,7 @@ export function start(ready: Promise<WebAssembly.Module>): void {
     event.preventDefault();
     if (!drop.closest("section")?.hidden) take(event.dataTransfer?.files);
   });
-  button("capture-cancel").addEventListener("click", () => capture?.end());
+  button("capture-cancel").addEventListener("click", () => cancel(ready));
   input("capture-text").value = settings().get("text") ?? "";
   input("capture-text").addEventListener("input", () => {
     clearTimeout(typing);

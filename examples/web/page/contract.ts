@@ -48,6 +48,8 @@ export interface RoleEvent {
 export interface Summary {
   /** Why a capture could not be read to its end. */
   cut: string | null;
+  /** What else is to be told, such as impossible times. */
+  notes: string[];
   has_times: boolean;
   summary: {
     received: number;

@@ -26,6 +26,24 @@ export const button = (id: string) => the(id, HTMLButtonElement);
 export const input = (id: string) => the(id, HTMLInputElement);
 export const select = (id: string) => the(id, HTMLSelectElement);
 
+/** A field for a number. Not one of type "number": that drops a comma, and turns with the wheel. */
+export const numberField = (value: string) =>
+  make("input", { inputmode: "decimal", autocomplete: "off", size: "5", value });
+
+/** What is written in it, with a point or a comma; nothing if that is no number in this range. */
+export function numberIn(
+  field: HTMLInputElement,
+  least: number,
+  most: number,
+  isWhole = false,
+): number | undefined {
+  const text = field.value.trim().replace(",", ".").replace("−", "-");
+  const value = /^[-+]?\d+(\.\d+)?$/.test(text) ? Number(text) : NaN;
+  return value >= least && value <= most && (!isWhole || Number.isInteger(value))
+    ? value
+    : undefined;
+}
+
 /** Sets a text, and leaves the page alone if it is there already. */
 export function say(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;

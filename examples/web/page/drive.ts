@@ -1,7 +1,7 @@
 /** A rover: what it reports, how far its stop has come, and how it is driven. */
 import { isPending, type RoverState, type Simulation } from "./contract.ts";
 import { Disc } from "./disc.ts";
-import { make, say } from "./dom.ts";
+import { make, numberField, numberIn, say } from "./dom.ts";
 import type { Session } from "./session.ts";
 import type { Rover } from "./wasm.ts";
 
@@ -43,22 +43,7 @@ export class Drive {
     private readonly refused: (why: string) => void,
     private readonly simulation?: Simulation,
   ) {
-    const speed = make("input", {
-      type: "number",
-      min: "-100",
-      max: "100",
-      step: "any",
-      required: "",
-      value: "30",
-    });
-    const angular = make("input", {
-      type: "number",
-      min: "-100",
-      max: "100",
-      step: "any",
-      required: "",
-      value: "0",
-    });
+    const [speed, angular] = [numberField("30"), numberField("0")];
     const halt = make(
       "button",
       { type: "button" },
@@ -80,9 +65,10 @@ export class Drive {
     );
     orders.addEventListener("submit", (event) => {
       event.preventDefault();
-      if (!speed.checkValidity() || !angular.checkValidity())
-        return this.refused("Numbers from -100 to 100, please. Nothing was sent.");
-      this.give((rover, now) => rover.drive(speed.valueAsNumber, angular.valueAsNumber, now));
+      const [ahead, turn] = [speed, angular].map((field) => numberIn(field, -100, 100, true));
+      if (ahead === undefined || turn === undefined)
+        return this.refused("Whole numbers from -100 to 100, please. Nothing was sent.");
+      this.give((rover, now) => rover.drive(ahead, turn, now));
     });
     if (simulation)
       this.card.append(

@@ -54,6 +54,8 @@ let recording: Blob[] = [];
 let isBusy = false;
 /** The port is closed as soon as everything is seen to stand still. */
 let isClosing = false;
+/** A line was lost or closed while something may have moved: the next session begins with a stop. */
+let isStopOwed = false;
 
 const protocol = (): "ucp" | "ikeya" | "ikeya-3" =>
   select("line-protocol").value as "ucp" | "ikeya" | "ikeya-3";
@@ -204,6 +206,8 @@ function connect(): Promise<void> {
     machine.session.onclosed = lost;
     guard(machine);
     if (kind() === "bus") machine.session.order((role, now) => (role as Bus).discover(now));
+    if (isStopOwed) machine.disarm("When the last line ended, something may have moved: stop.");
+    isStopOwed = false;
     say(
       words,
       kind() === "bus"
@@ -216,6 +220,7 @@ function connect(): Promise<void> {
 /** The line is gone while there may be motors that move. */
 function lost(reason: string): void {
   if (machine) unguard(machine);
+  isStopOwed ||= machine?.isAtRisk() ?? false;
   void machine?.session.close();
   machine = undefined;
   warn(
@@ -242,6 +247,7 @@ async function close(): Promise<void> {
     return;
   }
   const isPending = machine?.isStopPending ?? false;
+  isStopOwed = isPending;
   await end();
   if (isPending)
     warn("The port was closed before everything was seen to stand still: a motor may be moving.");

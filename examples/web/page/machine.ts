@@ -24,6 +24,8 @@ export class MovingMachine implements Machine {
   isArmed: boolean;
   /** As of the last picture. */
   isStopPending = false;
+  /** Somebody has pressed STOP. */
+  wasStopped = false;
   private stopWords = "";
 
   private constructor(
@@ -93,6 +95,7 @@ export class MovingMachine implements Machine {
   }
 
   stop(): void {
+    this.wasStopped = true;
     this.session.stop();
   }
 

@@ -10,7 +10,7 @@ import {
   STOP_WORDS,
   type Truth,
 } from "./contract.ts";
-import { make, say } from "./dom.ts";
+import { make, numberField, numberIn, say } from "./dom.ts";
 import type { Session } from "./session.ts";
 import { Disc } from "./disc.ts";
 import type { Bus } from "./wasm.ts";
@@ -27,7 +27,10 @@ const HEALTH_WORDS: Record<BusNode["health"], string> = {
 /**
  * What a person can mean. The crate takes any number, and what a motor can do is not known here.
  */
-const LIMITS = { min: "-50", max: "50" };
+const MOST = 50;
+
+/** A motor that turns more slowly stands still (ruling I12). */
+const STANDS_RPS = 0.05;
 
 /** The cards of a bus, one for each node that was heard. */
 export class Motors {
@@ -70,7 +73,7 @@ class MotorCard {
   private readonly reported = make("dd");
   private readonly health = make("dd");
   private readonly stop = make("dd");
-  private readonly goal = make("input", { type: "number", step: "any", required: "", ...LIMITS });
+  private readonly goal = numberField("");
   private readonly turn = make("button", { type: "submit" });
 
   constructor(
@@ -136,11 +139,11 @@ class MotorCard {
   }
 
   private move(): void {
-    if (!this.goal.checkValidity())
+    const goal = numberIn(this.goal, -MOST, MOST);
+    if (goal === undefined)
       return this.refused(
-        `Motor ${this.node.id}: a number from ${LIMITS.min} to ${LIMITS.max}, please. Nothing was sent.`,
+        `Motor ${this.node.id}: a number from -${MOST} to ${MOST}, please. Nothing was sent.`,
       );
-    const goal = this.goal.valueAsNumber;
     const { id, mode } = this.node;
     this.give((bus, now) =>
       mode === "position" ? bus.set_position(id, goal, now) : bus.set_velocity(id, goal, now),
@@ -171,6 +174,13 @@ export function plug(name: string, pull: (isUnplugged: boolean) => void): HTMLEl
 export const pendingStops = (state: BusState): BusNode[] =>
   state.nodes.filter((node) => isPending(node.stop));
 
+/** What a page that was lost, or somebody else, has set moving. */
+const movingWithoutOrder = (state: BusState): number[] =>
+  state.nodes
+    .filter(({ velocity, target }) => target === null && Math.abs(velocity ?? 0) >= STANDS_RPS)
+    .filter(({ stop }) => stop === "not_asked" || stop === "standing_still")
+    .map(({ id }) => id);
+
 /** How far the stop of a bus has come, in one sentence. */
 export function busStopWords(state: BusState): string {
   const names = (progress: BusNode["stop"]) =>
@@ -178,5 +188,8 @@ export function busStopWords(state: BusState): string {
   const parts = (["still_moving", "owed", "confirmed", "standing_still"] as const)
     .filter((progress) => names(progress).length > 0)
     .map((progress) => `Motor ${names(progress).join(", ")}: ${STOP_WORDS[progress]}.`);
+  const moving = movingWithoutOrder(state);
+  if (moving.length > 0)
+    parts.unshift(`Motor ${moving.join(", ")} MOVES without an order from here: press STOP.`);
   return parts.length > 0 ? parts.join(" ") : "No stop was asked for.";
 }

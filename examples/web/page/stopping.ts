@@ -41,16 +41,12 @@ function stopAll(): void {
   for (const machine of machines) machine.stop();
 }
 
-const takesText = (target: EventTarget | null): boolean =>
-  target instanceof HTMLTextAreaElement ||
-  (target instanceof HTMLInputElement && ["text", "search"].includes(target.type));
-
 /**
  * The space bar stops, also where it would press a button, open a list or tick a box: for these
  * there is the enter key.
  */
 function key(event: KeyboardEvent): void {
-  if (machines.size === 0 || takesText(event.target)) return;
+  if (machines.size === 0) return;
   const isDown = event.type === "keydown" && !event.repeat;
   const isBox = event.target instanceof HTMLInputElement && event.target.type === "checkbox";
   if (event.key !== " " && !(event.key === "Enter" && isBox)) return;

@@ -81,8 +81,8 @@ export function draw(): void {
   say(
     hint,
     wasPending
-      ? "Everything was seen to stand still. Set it moving again, with noise or a pulled plug."
-      : "STOP: it is repeated until everything is seen to stand still.",
+      ? "What was stopped is seen to stand still. Set it moving again, with noise or a pulled plug."
+      : "STOP: it is repeated until what was stopped is seen to stand still.",
   );
 }
 
@@ -92,6 +92,10 @@ function runAway(): void {
   const { machine, kind } = simulation;
   const session = machine.session;
   if (session.closedBecause !== undefined) return;
+  if (machine.wasStopped) {
+    simulation.isRunaway = true;
+    return;
+  }
   try {
     if (kind === "bus") {
       if (

@@ -19,6 +19,10 @@ use crate::{
 /// How long a browser may take to deliver an answer.
 const DELIVERY: Duration = Duration::from_millis(40);
 
+/// A position that was measured so long ago is held by a stop as it is: a page that closes has no
+/// time to read another one.
+const HOLD_AGE: Duration = Duration::from_millis(60);
+
 /// How often each node is read, and told its set-point.
 const PERIOD: Duration = Duration::from_millis(25);
 
@@ -28,6 +32,8 @@ pub struct Bus {
     session: Session<Master>,
     /// Somebody has stopped all: what is found later is stopped too.
     is_stopped: bool,
+    /// Once all known ones are seen to stand still, the others are searched for.
+    is_search_due: bool,
 }
 
 #[wasm_bindgen]
@@ -39,11 +45,12 @@ impl Bus {
         config.baud = baud;
         (config.reply_timeout, config.late_guard) = (DELIVERY, DELIVERY);
         config.polling = Polling::Every(PERIOD);
+        config.hold_age = HOLD_AGE;
         config.dead_man = Some(span(dead_man_ms));
         // The clock of a page has steps of 100 µs.
         config.accepts_early = true;
         let session = Session::new(Master::new(config, instant(now)), told, now);
-        Self { session, is_stopped: false }
+        Self { session, is_stopped: false, is_search_due: false }
     }
 
     /// Takes in what was received.
@@ -90,16 +97,15 @@ impl Bus {
         Ok(())
     }
 
-    /// Stops all that were heard, or are owed a stop; before any was heard, all ids. Those that are
-    /// found later are stopped then.
+    /// Stops all that were heard, or are owed a stop; then searches for others, such as one that
+    /// was plugged in later, and stops them.
     pub fn stop_all(&mut self, now: f64) {
-        self.is_stopped = true;
+        (self.is_stopped, self.is_search_due) = (true, true);
         let role = &mut self.session.role;
-        let known = |node: &NodeId| role.mode(*node).is_some() || role.stops_owed().contains(*node);
-        let nodes: Vec<_> = NodeId::ALL.into_iter().filter(known).collect();
-        match &*nodes {
-            [] => role.stop_all(instant(now)),
-            nodes => nodes.iter().for_each(|node| role.stop(*node, instant(now))),
+        for node in NodeId::ALL {
+            if role.mode(node).is_some() || role.stops_owed().contains(node) {
+                role.stop(node, instant(now));
+            }
         }
     }
 
@@ -121,7 +127,7 @@ impl Bus {
             "nodes": nodes,
             "stops_owed": owed,
             "coasting": coasting,
-            "is_quiet": owed.is_empty() && coasting.is_empty(),
+            "is_quiet": self.is_quiet(),
             "statistics": {
                 "reads": seen.reads,
                 "writes": seen.writes,
@@ -146,6 +152,16 @@ impl Bus {
                 self.session.role.stop(node, instant(now));
             }
         }
+        if self.is_search_due && self.is_quiet() && !self.session.role.is_discovering() {
+            self.is_search_due = false;
+            self.session.role.discover(instant(now));
+        }
+    }
+
+    /// Whether every stop that was asked for is seen to be obeyed.
+    fn is_quiet(&self) -> bool {
+        let role = &self.session.role;
+        role.stops_owed().is_empty() && role.coasting().is_empty()
     }
 
     fn node(&self, node: NodeId, now: f64) -> Value {

@@ -11,6 +11,10 @@ use serde_json::{Value, json};
 /// A turn of the page's loop that comes so late that received bytes may have waited meanwhile.
 const LATE: Duration = Duration::from_millis(30);
 
+/// Time behind such a turn in which bytes that have waited are still handed over: messages of the
+/// browser are not in the order of their times.
+const BACKLOG: Duration = Duration::from_millis(100);
+
 /// Events that a page may fetch late: a hidden one draws nothing.
 const MOST_EVENTS: usize = 1000;
 
@@ -25,6 +29,8 @@ pub(crate) struct Session<R: Endpoint> {
     events: VecDeque<Value>,
     /// The latest turn of the page's loop.
     turn: Instant,
+    /// The last turn before the page was held up, and when its backlog is over.
+    held_up: Option<(Instant, Instant)>,
 }
 
 /// The time of the page.
@@ -39,16 +45,27 @@ pub(crate) fn span(ms: f64) -> Duration {
 
 impl<R: Endpoint> Session<R> {
     pub(crate) fn new(role: R, told: Told<R::Event>, now: f64) -> Self {
-        Self { role, told, events: VecDeque::new(), turn: instant(now) }
+        Self { role, told, events: VecDeque::new(), turn: instant(now), held_up: None }
     }
 
     /// Takes in received bytes. If the page was held up, they may have waited.
     pub(crate) fn receive(&mut self, bytes: &[u8], now: f64) {
-        let (since, now) = (self.turn, instant(now));
-        if now < since + LATE {
-            self.role.handle_input(bytes, now);
+        self.take_turn(now);
+        match self.held_up {
+            Some((since, _)) => {
+                self.role.handle_input(bytes, Arrival::Between { since, now: self.turn });
+            }
+            None => self.role.handle_input(bytes, self.turn),
+        }
+    }
+
+    fn take_turn(&mut self, now: f64) {
+        let now = instant(now);
+        if now >= self.turn + LATE {
+            let since = self.held_up.map_or(self.turn, |(since, _)| since);
+            self.held_up = Some((since, now + BACKLOG));
         } else {
-            self.role.handle_input(bytes, Arrival::Between { since, now });
+            self.held_up = self.held_up.filter(|(_, end)| now < *end);
         }
         self.turn = now;
     }
@@ -72,7 +89,7 @@ impl<R: Endpoint> Session<R> {
 
     /// The next frame to write, if one is due.
     pub(crate) fn transmit(&mut self, now: f64) -> Option<Vec<u8>> {
-        self.turn = instant(now);
+        self.take_turn(now);
         drop(self.catch_up(now));
         self.role.poll_transmit(self.turn).map(<[u8]>::to_vec)
     }

@@ -112,7 +112,8 @@ async function fakeSerial(context, page, simulator) {
         this.dispatchEvent(new Event("disconnect", { bubbles: true }));
       }
     }
-    const port = (window.fakePort = new Port());
+    let port = (window.fakePort = new Port());
+    window.plugIn = () => (port = window.fakePort = new Port());
     const serial = Object.assign(new EventTarget(), {
       requestPort: async () => port,
       getPorts: async () => [port],
@@ -209,10 +210,22 @@ async function aPulledPlugAndNoise() {
 async function refusedOrdersAreSaid() {
   const page = await open();
   await until(async () => (await page.locator("#try .card").count()) === 8, "eight motors");
-  await card(page, "Motor 3").locator("input[type=number]").fill("1e9");
+  await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("1e9");
   await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
   await page.locator("#try-refused").waitFor();
-  await card(page, "Motor 3").locator("input[type=number]").fill("");
+  for (const text of ["1e9", "1 5", "--5", "0x10", "51", "1,5,5", "NaN"]) {
+    await card(page, "Motor 3").locator("input[inputmode=decimal]").fill(text);
+    await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+    await says(page.locator("#try-refused"), "Nothing was sent");
+  }
+  await wait(300);
+  await says(card(page, "Motor 3"), /Really\s*0\.00/);
+  await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("1,5");
+  await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+  await says(card(page, "Motor 3"), /Really\s*1\.[45]/);
+  await card(page, "Motor 3").getByRole("button", { name: "Stop" }).click();
+  await says(card(page, "Motor 3"), "seen to stand still");
+  await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("");
   await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
   await page.locator("#try-refused").waitFor();
   await wait(300);
@@ -481,6 +494,44 @@ async function aRealLineScanArmSpinStopUnplug() {
   await close(page);
 }
 
+/** What runs when the line is lost is stopped first thing when it is there again. */
+async function aLostMotorIsStoppedWhenTheLineIsBack() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const page = await scanned(simulator);
+  await page.locator("#line-arm").click();
+  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await until(() => turns(simulator) > 0.9, "the motor runs");
+  await page.pull();
+  await says(page.locator("#line-alarm"), "may still be moving");
+  assert.ok(turns(simulator) > 0.9, "nobody can reach it");
+  await page.evaluate(() => void window.plugIn());
+  await page.locator("#line-choose").click();
+  await page.locator("#line-connect").click();
+  await until(() => Math.abs(turns(simulator)) < 0.05, "it is stopped");
+  await says(card(page, "Motor 1"), "seen to stand still");
+  await close(page);
+}
+
+/** A motor that somebody else has set moving is said to move; one that comes later is stopped. */
+async function aMotorThatNobodyHereHasMoved() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const other = new wasm.Bus(500_000, 60_000, performance.now());
+  other.discover(performance.now());
+  for (let isAsked = false; turns(simulator) < 0.9;) {
+    const now = performance.now();
+    for (let frame; (frame = other.transmit(now));) simulator.write(frame, now);
+    other.receive(simulator.read(now), now);
+    if (isAsked || JSON.parse(other.state(now)).nodes[0].mode === null) continue;
+    other.set_velocity(1, 1, now);
+    isAsked = true;
+  }
+  const page = await scanned(simulator);
+  await says(page.locator("#stop-words"), "Motor 1 MOVES without an order from here");
+  await page.keyboard.press("Space");
+  await says(card(page, "Motor 1"), "seen to stand still");
+  await close(page);
+}
+
 async function closingStopsFirst() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   const page = await scanned(simulator);
@@ -727,6 +778,8 @@ const stories = [
   hostileFilesAreNoTrouble,
   decodingIsCancelled,
   aRealLineScanArmSpinStopUnplug,
+  aLostMotorIsStoppedWhenTheLineIsBack,
+  aMotorThatNobodyHereHasMoved,
   closingStopsFirst,
   theDeadManDisarms,
   aHiddenPageStops,

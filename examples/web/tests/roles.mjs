@@ -59,6 +59,51 @@ const state = (role, now) => JSON.parse(role.state(now));
   assert.throws(() => bus.set_velocity(1, NaN, now), Error);
 }
 
+// Of a position motor, old answers are not taken for where it is: a stop does not drive it back.
+for (let phase = 0; phase < 40; phase += 1) {
+  const simulator = Simulator.bus("1:position", 1, 0);
+  const bus = new Bus(500_000, 600_000, 0);
+  bus.discover(0);
+  let now = serve(bus, simulator, 0, 2000);
+  bus.set_position(1, 40, now);
+  now = serve(bus, simulator, now, 700 + phase);
+  const waiting = [];
+  for (const end = now + 1500; now < end; now += 1) waiting.push(...simulator.read(now));
+  const at = JSON.parse(simulator.state()).nodes[0].turns;
+  bus.stop_all(now);
+  for (let frame; (frame = bus.transmit(now));) simulator.write(frame, now);
+  bus.receive(new Uint8Array(waiting), now);
+  now = serve(bus, simulator, now, 6000);
+  assert.equal(state(bus, now).nodes[0].stop, "standing_still");
+  const stood = JSON.parse(simulator.state()).nodes[0].turns;
+  assert.ok(stood > at - 0.05, `phase ${phase}: it was at ${at}, and stands at ${stood}`);
+}
+
+// One that is plugged in later is found and stopped behind a STOP.
+{
+  const simulator = Simulator.bus("1:velocity 2:velocity", 1, 0);
+  const other = new Bus(500_000, 600_000, 0);
+  other.discover(0);
+  let now = serve(other, simulator, 0, 2000);
+  other.set_velocity(2, 1, now);
+  now = serve(other, simulator, now, 2000);
+  simulator.unplug(2, true);
+  const bus = new Bus(500_000, 600_000, now);
+  bus.discover(now);
+  now = serve(bus, simulator, now, 3000);
+  simulator.unplug(2, false);
+  now = serve(bus, simulator, now, 1000);
+  bus.stop_all(now);
+  now = serve(bus, simulator, now, 5000);
+  assert.deepEqual(
+    state(bus, now)
+      .nodes.map(({ stop }) => stop)
+      .slice(0, 3),
+    ["standing_still", "standing_still", "not_asked"],
+  );
+  assert.ok(Math.abs(JSON.parse(simulator.state()).nodes[1].rps) < 0.05);
+}
+
 {
   const simulator = Simulator.bus("1:velocity 8:velocity", 1, 0);
   const other = new Bus(500_000, 600_000, 0);
