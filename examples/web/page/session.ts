@@ -23,6 +23,8 @@ export interface Role {
   wait(now: number): number | undefined;
   state(now: number): string;
   events(): string;
+  /** What is written last by a page that closes. */
+  last_words?(now: number): Uint8Array;
   free(): void;
 }
 
@@ -99,6 +101,8 @@ export class Session<R extends Role, State> {
       this.transport.write(frame).catch(() => {});
       this.told(true);
     }
+    const last = this.role.last_words?.(performance.now()) ?? new Uint8Array();
+    if (last.length > 0) this.transport.write(last).catch(() => {});
   }
 
   private told(ok: boolean): void {

@@ -2,7 +2,7 @@
 
 use axlewire::{
     ikeya::{
-        Master, NodeId, Position, Rps,
+        Master, NodeId, Position, Rps, WriteRequest,
         board::{Status, Target},
         master::{Cause, Health, MasterConfig, MasterEvent, Polling, StopProgress},
     },
@@ -22,6 +22,9 @@ const DELIVERY: Duration = Duration::from_millis(40);
 /// A position that was measured so long ago is held by a stop as it is: a page that closes has no
 /// time to read another one.
 const HOLD_AGE: Duration = Duration::from_millis(60);
+
+/// The oldest position that a closing page holds.
+const LAST_SEEN: Duration = Duration::from_millis(150);
 
 /// How often each node is read, and told its set-point.
 const PERIOD: Duration = Duration::from_millis(25);
@@ -107,6 +110,23 @@ impl Bus {
                 role.stop(node, instant(now));
             }
         }
+    }
+
+    /// Packets for a page that closes and will hear nothing more: they hold the position motors
+    /// that were commanded where they were last seen, which the role would read anew before.
+    /// Write them behind the other packets of a stop. A position older than some 150 ms is left
+    /// out: the motor would be driven back to it.
+    pub fn last_words(&self, now: f64) -> Vec<u8> {
+        let (role, now) = (&self.session.role, instant(now));
+        let owed = role.stops_owed();
+        let hold = |node: NodeId| match role.status(node)? {
+            (Status::Position(position), at) if owed.contains(node) && now < at + LAST_SEEN => {
+                Some(WriteRequest::position(node, position))
+            }
+            _ => None,
+        };
+        let packets = NodeId::ALL.into_iter().filter_map(hold);
+        packets.flat_map(|packet| packet.as_bytes().to_vec()).collect()
     }
 
     /// Somebody is there; if that comes too late, the dead-man has fired before.

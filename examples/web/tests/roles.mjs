@@ -79,6 +79,30 @@ for (let phase = 0; phase < 40; phase += 1) {
   assert.ok(stood > at - 0.05, `phase ${phase}: it was at ${at}, and stands at ${stood}`);
 }
 
+// A page that closes hears nothing any more: what it hands over stops a position motor too.
+for (let phase = 0; phase < 40; phase += 1) {
+  const simulator = Simulator.bus("1:position", 1, 0);
+  const bus = new Bus(500_000, 600_000, 0);
+  bus.discover(0);
+  let now = serve(bus, simulator, 0, 2000);
+  bus.set_position(1, 40, now);
+  now = serve(bus, simulator, now, 700 + phase);
+  bus.stop_all(now);
+  // As `stopWithoutWaiting` of the page does it.
+  for (let isHandedOver = false; ; now += 1) {
+    const frame = bus.transmit(now);
+    if (frame) simulator.write(frame, now);
+    else if (isHandedOver) break;
+    isHandedOver ||= frame !== undefined;
+  }
+  simulator.write(bus.last_words(now), now);
+  now = hold(simulator, now, 4000);
+  const { turns } = JSON.parse(simulator.state()).nodes[0];
+  now = hold(simulator, now, 1000);
+  assert.equal(JSON.parse(simulator.state()).nodes[0].turns, turns, `phase ${phase}: it stands`);
+  assert.ok(turns < 39, `phase ${phase}: it was not stopped, but has arrived`);
+}
+
 // One that is plugged in later is found and stopped behind a STOP.
 {
   const simulator = Simulator.bus("1:velocity 2:velocity", 1, 0);
