@@ -84,7 +84,7 @@ impl Protocol {
 
     /// The protocol of this name.
     pub(crate) fn named(name: &str) -> Option<Self> {
-        [Self::Ucp, Self::Ikeya, Self::Ikeya3].into_iter().find(|it| it.name() == name)
+        Self::value_variants().iter().copied().find(|it| it.name() == name)
     }
 
     /// Default speed of its lines, bit/s.

@@ -19,8 +19,6 @@ export interface BusNode {
 export interface BusState {
   discovering: boolean;
   nodes: BusNode[];
-  stops_owed: number[];
-  is_quiet: boolean;
   statistics: Record<string, number>;
 }
 

@@ -139,15 +139,10 @@ impl Bus {
     pub fn state(&self, now: f64) -> String {
         let role = &self.session.role;
         let nodes: Vec<_> = NodeId::ALL.into_iter().map(|node| self.node(node, now)).collect();
-        let owed: Vec<_> = role.stops_owed().iter().map(NodeId::get).collect();
-        let coasting: Vec<_> = role.coasting().iter().map(NodeId::get).collect();
         let seen = role.statistics();
         json!({
             "discovering": role.is_discovering(),
             "nodes": nodes,
-            "stops_owed": owed,
-            "coasting": coasting,
-            "is_quiet": self.is_quiet(),
             "statistics": {
                 "reads": seen.reads,
                 "writes": seen.writes,

@@ -23,6 +23,16 @@ function hold(simulator, from, ms) {
   return from + ms;
 }
 
+/** A position motor on its long way, at some phase of its reads. */
+function underWay(phase) {
+  const simulator = Simulator.bus("1:position", 1, 0);
+  const bus = new Bus(500_000, 600_000, 0);
+  bus.discover(0);
+  const now = serve(bus, simulator, 0, 2000);
+  bus.set_position(1, 40, now);
+  return { simulator, bus, now: serve(bus, simulator, now, 700 + phase) };
+}
+
 const state = (role, now) => JSON.parse(role.state(now));
 
 {
@@ -61,12 +71,7 @@ const state = (role, now) => JSON.parse(role.state(now));
 
 // Of a position motor, old answers are not taken for where it is: a stop does not drive it back.
 for (let phase = 0; phase < 40; phase += 1) {
-  const simulator = Simulator.bus("1:position", 1, 0);
-  const bus = new Bus(500_000, 600_000, 0);
-  bus.discover(0);
-  let now = serve(bus, simulator, 0, 2000);
-  bus.set_position(1, 40, now);
-  now = serve(bus, simulator, now, 700 + phase);
+  let { simulator, bus, now } = underWay(phase);
   const waiting = [];
   for (const end = now + 1500; now < end; now += 1) waiting.push(...simulator.read(now));
   const at = JSON.parse(simulator.state()).nodes[0].turns;
@@ -81,12 +86,7 @@ for (let phase = 0; phase < 40; phase += 1) {
 
 // A page that closes hears nothing any more: what it hands over stops a position motor too.
 for (let phase = 0; phase < 40; phase += 1) {
-  const simulator = Simulator.bus("1:position", 1, 0);
-  const bus = new Bus(500_000, 600_000, 0);
-  bus.discover(0);
-  let now = serve(bus, simulator, 0, 2000);
-  bus.set_position(1, 40, now);
-  now = serve(bus, simulator, now, 700 + phase);
+  let { simulator, bus, now } = underWay(phase);
   bus.stop_all(now);
   // As `stopWithoutWaiting` of the page does it.
   for (let isHandedOver = false; ; now += 1) {
