@@ -2,7 +2,7 @@
  * The second view: a file is decoded, listed, filtered, plotted and exported. Nothing of it leaves
  * this computer.
  */
-import { remember, settings } from "./address.ts";
+import { isShown, remember, settings, view } from "./address.ts";
 import { CaptureFile, type Contents } from "./capture_file.ts";
 import {
   button,
@@ -54,11 +54,16 @@ function cancel(ready: Promise<WebAssembly.Module>): void {
   if (again) void ready.then((module) => open(module, again.file));
 }
 
+/** Nothing: it is found out. */
+function chosenProtocol(): string | undefined {
+  const { value } = select("capture-protocol");
+  return value === "auto" ? undefined : value;
+}
+
 async function open(module: WebAssembly.Module, file: File): Promise<void> {
   capture?.end();
   contents = undefined;
-  const protocol = select("capture-protocol").value;
-  const mine = new CaptureFile(file, module, protocol === "auto" ? undefined : protocol, working);
+  const mine = new CaptureFile(file, module, chosenProtocol(), working);
   capture = mine;
   show(opened, false);
   say(words, `${file.name} is being decoded …`);
@@ -67,14 +72,19 @@ async function open(module: WebAssembly.Module, file: File): Promise<void> {
     contents = await mine.contents;
     say(words, sentence(file.name, contents));
     show(opened, true);
-    offerTables();
-    await filter(Number(settings().get("row") ?? "-1"));
-    plot.open(mine, contents);
+    await showContents(mine, contents);
   } catch (error) {
     if (capture === mine) say(words, `${file.name}: ${message(error)}`);
   } finally {
     if (capture === mine) idle();
   }
+}
+
+/** Lists and plots what the address says. */
+async function showContents(capture: CaptureFile, contents: Contents): Promise<void> {
+  offerTables(contents);
+  await filter(Number.parseInt(settings().get("row") ?? "", 10));
+  plot.open(capture, contents);
 }
 
 function working(share: number): void {
@@ -105,9 +115,9 @@ function sentence(name: string, { summary: all, tables, rows }: Contents): strin
 }
 
 /** A box for each table, and the same tables for the export. */
-function offerTables(): void {
+function offerTables(contents: Contents): void {
   const wanted = settings().get("tables")?.split(",") ?? [];
-  const filled = contents?.tables.filter(({ rows }) => rows > 0) ?? [];
+  const filled = contents.tables.filter(({ rows }) => rows > 0);
   tables.replaceChildren(
     ...filled.map(({ table, rows }) => {
       const box = make("input", { type: "checkbox", value: table });
@@ -195,17 +205,43 @@ async function save(kind: "csv" | "jsonl"): Promise<void> {
   }
 }
 
+/** Obeys the address: the one that the page was opened with, or one that was edited since. */
+function obeyAddress(): void {
+  if (view() !== "capture") return;
+  const [choice, wanted] = [select("capture-protocol"), settings().get("protocol") ?? ""];
+  choice.value = [...choice.options].some(({ value }) => value === wanted) ? wanted : "auto";
+  input("capture-text").value = settings().get("text") ?? "";
+  remember({ protocol: chosenProtocol() ?? "" });
+}
+
+/** What was looked for in one file means nothing in the next. */
+function forget(): void {
+  remember({ text: "", tables: "", row: "", plot: "", columns: "", from: "", to: "" });
+  input("capture-text").value = "";
+}
+
 export function start(ready: Promise<WebAssembly.Module>): void {
   const take = (files: FileList | null | undefined) => {
     const file = files?.[0];
+    if (file && capture) forget();
     if (file) void ready.then((module) => open(module, file));
   };
   const file = input("capture-file");
   file.addEventListener("change", () => take(file.files));
-  select("capture-protocol").value = settings().get("protocol") ?? "auto";
-  select("capture-protocol").addEventListener("change", () => {
-    remember({ protocol: select("capture-protocol").value });
+  const again = () => {
     if (capture) void ready.then((module) => capture && open(module, capture.file));
+  };
+  obeyAddress();
+  addEventListener("hashchange", () => {
+    if (view() !== "capture" || isShown()) return;
+    const protocol = chosenProtocol();
+    obeyAddress();
+    if (chosenProtocol() !== protocol) again();
+    else if (capture && contents) void showContents(capture, contents);
+  });
+  select("capture-protocol").addEventListener("change", () => {
+    remember({ protocol: chosenProtocol() ?? "" });
+    again();
   });
   addEventListener("dragover", (event) => event.preventDefault());
   addEventListener("drop", (event: DragEvent) => {
@@ -213,7 +249,6 @@ export function start(ready: Promise<WebAssembly.Module>): void {
     if (!drop.closest("section")?.hidden) take(event.dataTransfer?.files);
   });
   button("capture-cancel").addEventListener("click", () => cancel(ready));
-  input("capture-text").value = settings().get("text") ?? "";
   input("capture-text").addEventListener("input", () => {
     clearTimeout(typing);
     typing = setTimeout(() => void filter(), TYPING_MS);

@@ -53,7 +53,8 @@ export function open(opened: CaptureFile, what: Contents): void {
   const best = tables.toSorted((a, b) => tells(b) - tells(a) || b.rows - a.rows)[0]?.table ?? "";
   const wanted = settings().get("plot") ?? "";
   tableChoice.value = tables.some(({ table }) => table === wanted) ? wanted : best;
-  range = [number(settings().get("from")), number(settings().get("to"))];
+  const [from, to] = [number(settings().get("from")), number(settings().get("to"))];
+  range = from < to ? [from, to] : [NaN, NaN];
   offerColumns(settings().get("columns")?.split(","));
 }
 

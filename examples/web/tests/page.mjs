@@ -294,6 +294,8 @@ async function aCaptureIsListedFilteredPlottedSaved() {
   assert.match(page.url(), /tables=skipped/);
   await gap.uncheck();
 
+  await page.locator("#capture-text").pressSequentially("c d");
+  assert.equal(await page.locator("#capture-text").inputValue(), "c d", "where nothing moves");
   await page.locator("#capture-text").fill("CRC");
   await until(
     async () => (await text(page, "#capture-shown")).startsWith(`${truth.filter([], "CRC")} rows`),
@@ -349,10 +351,30 @@ async function theAddressBringsTheViewBack() {
     "it is filtered",
   );
   assert.equal(await page.locator("#capture-text").inputValue(), "crc");
+
+  const shows = (found) => says(page.locator("#capture-shown"), `${found} row`);
+  const edit = (hash) => page.evaluate((hash) => void (location.hash = hash), hash);
+  await edit("#capture?text=idle&row=banana&from=2&to=1");
+  await shows(truth.filter([], "idle"));
+  assert.equal(await page.locator("#capture-text").inputValue(), "idle");
+  await page.locator("#to-try").click();
+  await page.locator("#try-hint").waitFor();
+  await page.locator("#to-capture").click();
+  assert.match(page.url(), /#capture\?.*text=idle/, "the link leads back to what was shown");
+  await edit("#capture?protocol=evil");
+  await shows(truth.rows().toLocaleString("en"));
+  assert.equal(await page.locator("#capture-protocol").inputValue(), "auto");
+  await edit("#capture?protocol=ucp");
+  await says(page.locator("#capture-words"), "ucp");
+
+  await edit("#capture?protocol=ikeya&text=crc");
+  await shows(truth.filter([], "crc"));
+  await drop(page, "next.bin", Buffer.from("aa01bed055010000000031de", "hex"));
+  await says(page.locator("#capture-shown"), "2 rows of 2");
+  assert.equal(await page.locator("#capture-text").inputValue(), "", "the search is forgotten");
   await close(page);
 }
 
-/** A capture of a million rows, and bytes that are no capture. */
 /** A gap of a file of raw bytes shows its reason and its bytes. */
 async function aGapShowsItsBytes() {
   const page = await open("#capture?tables=skipped");
@@ -363,6 +385,7 @@ async function aGapShowsItsBytes() {
   await close(page);
 }
 
+/** A capture of a million rows, and bytes that are no capture. */
 async function aMillionRowsAndNonsense() {
   const page = await open("#capture");
   const frame = Buffer.from("aa01bed055010000000031de", "hex");
@@ -386,6 +409,16 @@ async function aMillionRowsAndNonsense() {
       ) < 100,
     "the middle is shown",
   );
+  let saved = 0;
+  page.on("download", () => (saved += 1));
+  await page.locator("#export-json").click();
+  await page.locator("#capture-cancel").click();
+  await says(page.locator("#capture-words"), "is being decoded");
+  await says(page.locator("#capture-shown"), "1,000,000 rows of", 60_000);
+  await page.locator("#row-0, [role=option]").first().click();
+  await says(page.locator("#capture-detail"), "AA 01");
+  assert.equal(saved, 0, "a cancelled export saves nothing, and the list is there again");
+
   await page.mouse.move(200, 500);
   for (const nonsense of [
     Buffer.alloc(0),
