@@ -137,6 +137,7 @@ async function filter(selected = -1): Promise<void> {
   if (!capture) return;
   const mine = ++filtered;
   list.setAttribute("aria-busy", "true");
+  button("export-json").disabled = true;
   say(shown, "Searching …");
   try {
     const found = await capture.ask("filter", { tables: names, text });
@@ -149,7 +150,10 @@ async function filter(selected = -1): Promise<void> {
   } catch (error) {
     say(shown, message(error));
   } finally {
-    list.removeAttribute("aria-busy");
+    if (mine === filtered) {
+      list.removeAttribute("aria-busy");
+      button("export-json").disabled = false;
+    }
   }
 }
 
@@ -185,23 +189,24 @@ async function rawBytes(
 
 async function save(kind: "csv" | "jsonl"): Promise<void> {
   if (!capture || !contents) return;
-  const name = capture.file.name.replace(/\.(gz|pcapng|pcap|bin)$/g, "");
+  const mine = capture;
+  const name = mine.file.name.replace(/\.(gz|pcapng|pcap|bin)$/g, "");
   const table = select("export-table").value;
   try {
     if (kind === "csv") {
       const rows = contents.tables.find((one) => one.table === table)?.rows ?? 0;
-      download(`${name}.${table}.csv`, [await capture.ask("csv", { table, rows })], "text/csv");
+      download(`${name}.${table}.csv`, [await mine.ask("csv", { table, rows })], "text/csv");
     } else {
       download(
         `${name}.jsonl`,
-        [await capture.ask("jsonLines", { rows: shownRows })],
+        [await mine.ask("jsonLines", { rows: shownRows })],
         "application/jsonl",
       );
     }
   } catch (error) {
-    say(words, message(error));
+    if (capture === mine) say(words, message(error));
   } finally {
-    idle();
+    if (capture === mine) idle();
   }
 }
 

@@ -73,7 +73,7 @@ const answers: Answers = {
     inPieces(Math.max(rows, 1), CSV_ROWS, "text/csv", (from) => capture.csv(table, from, CSV_ROWS)),
   jsonLines: (capture, { rows }) =>
     inPieces(rows, JSON_ROWS, "application/jsonl", (from) => {
-      const lines = capture.lines(from, JSON_ROWS);
+      const lines = capture.lines(from, Math.min(JSON_ROWS, rows - from));
       return lines === "" || lines.endsWith("\n") ? lines : `${lines}\n`;
     }),
 };

@@ -94,13 +94,13 @@ export interface Truth {
 /** How far the stop of a motor has come, in words. */
 export const STOP_WORDS: Record<StopProgress, string> = {
   not_asked: "not asked",
-  owed: "asked, waiting for an answer",
-  confirmed: "confirmed, not yet seen to stand still",
-  standing_still: "seen to stand still",
-  still_moving: "STILL MOVING after the stop",
-  no_reports: "asked, but nothing is reported: it may be moving",
+  owed: "sent, no answer yet: it may be moving",
+  confirmed: "confirmed, not yet at standstill",
+  standing_still: "stopped, seen at standstill",
+  still_moving: "confirmed, but STILL MOVING",
+  no_reports: "sent, but nothing is reported: it may be moving",
 };
 
-/** A stop was asked for and the motor was not yet seen to stand still. */
+/** A stop was asked for and the motor was not yet seen at standstill. */
 export const isPending = (stop: StopProgress): boolean =>
   stop !== "not_asked" && stop !== "standing_still";

@@ -10,7 +10,7 @@ export type RoverSession = Session<Rover, RoverState>;
 const LINK_WORDS: Record<RoverState["link"], string> = {
   waiting: "nothing heard yet",
   up: "the rover reports",
-  down: "the rover is silent",
+  down: "THE ROVER IS SILENT",
 };
 
 /**
@@ -40,6 +40,7 @@ export class Drive {
   constructor(
     place: HTMLElement,
     private readonly session: RoverSession,
+    private readonly isArmed: () => boolean,
     private readonly refused: (why: string) => void,
     private readonly simulation?: Simulation,
   ) {
@@ -52,13 +53,13 @@ export class Drive {
     );
     halt.addEventListener("click", () => this.give((rover, now) => rover.stop(now)));
     this.lamp.addEventListener("click", () =>
-      this.give((rover, now) => rover.lamp(!this.isLit, now)),
+      this.giveArmed((rover, now) => rover.lamp(!this.isLit, now)),
     );
     const orders = make(
       "form",
       { class: "orders", novalidate: "" },
-      make("label", {}, "Ahead ", speed, " %"),
-      make("label", {}, "Turn ", angular, " %"),
+      make("label", {}, "Speed ", speed, " %"),
+      make("label", {}, "Steer ", angular, " %"),
       this.go,
       halt,
       this.lamp,
@@ -68,7 +69,7 @@ export class Drive {
       const [ahead, turn] = [speed, angular].map((field) => numberIn(field, -100, 100, true));
       if (ahead === undefined || turn === undefined)
         return this.refused("Whole numbers from -100 to 100, please. Nothing was sent.");
-      this.give((rover, now) => rover.drive(ahead, turn, now));
+      this.giveArmed((rover, now) => rover.drive(ahead, turn, now));
     });
     if (simulation)
       this.card.append(
@@ -78,14 +79,15 @@ export class Drive {
     place.replaceChildren(this.card);
   }
 
-  show(state: RoverState, mayMove: boolean): void {
-    if (this.go.disabled === mayMove) this.go.disabled = !mayMove;
-    if (this.lamp.disabled === mayMove) this.lamp.disabled = !mayMove;
+  show(state: RoverState): void {
+    for (const button of [this.go, this.lamp])
+      if (button.disabled === this.isArmed()) button.disabled = !this.isArmed();
     this.card.dataset.stop = state.stop;
     this.isLit = state.command?.lamp ?? false;
     this.lamp.setAttribute("aria-pressed", String(this.isLit));
     const rpm = this.simulation?.truth().rover?.rpm;
     if (rpm) this.turnWheels(rpm);
+    this.card.dataset.link = state.link;
     if (rpm) this.fact("Really", `wheels ${rpm.map((value) => value.toFixed(0)).join(", ")} 1/min`);
     this.fact(
       "Link",
@@ -97,15 +99,19 @@ export class Drive {
     this.fact("Stop", state.stop_text);
     this.fact(
       "Told to",
-      state.command ? `go ${state.command.speed} %, turn ${state.command.angular} %` : "do nothing",
+      state.command
+        ? `speed ${state.command.speed} %, steer ${state.command.angular} %`
+        : "do nothing",
     );
     this.fact(
       "Ping answered in",
       state.round_trip_ms === null ? "not measured" : `${state.round_trip_ms.toFixed(1)} ms`,
     );
     this.fact("Reports lost", String(state.statistics.reports_lost ?? 0));
-    for (const [term, field, unit, share] of REPORTED)
-      this.fact(term, `${reported(state.report?.[field], share)} ${unit}`);
+    for (const [term, field, unit, share] of REPORTED) {
+      const value = this.fact(term, `${reported(state.report?.[field], share)} ${unit}`);
+      value.classList.toggle("old", state.link === "down");
+    }
   }
 
   private turnWheels(rpm: number[]): void {
@@ -118,7 +124,7 @@ export class Drive {
     }
   }
 
-  private fact(term: string, text: string): void {
+  private fact(term: string, text: string): HTMLElement {
     let value = this.facts.get(term);
     if (!value) {
       value = make("dd");
@@ -126,6 +132,12 @@ export class Drive {
       this.list.append(make("div", {}, make("dt", {}, term), value));
     }
     say(value, text);
+    return value;
+  }
+
+  private giveArmed(order: (rover: Rover, now: number) => void): void {
+    if (!this.isArmed()) return this.refused("Not armed. Nothing was sent.");
+    this.give(order);
   }
 
   private give(order: (rover: Rover, now: number) => void): void {
@@ -141,5 +153,8 @@ function reported(value: unknown, share: number): string {
 export function roverStopWords(state: RoverState): string {
   return `Rover: ${state.stop_text}.`;
 }
+
+export const isRoverAlarming = (state: RoverState): boolean =>
+  isStopPending(state) && (state.link === "down" || state.stop === "still_moving");
 
 export const isStopPending = (state: RoverState): boolean => isPending(state.stop);

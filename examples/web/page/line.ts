@@ -48,14 +48,18 @@ interface Watch {
 
 let port: SerialPort | undefined;
 let machine: MovingMachine | undefined;
+let machineKind: Kind = "bus";
 let watch: Watch | undefined;
 /** What was watched, as pcapng; it is there until the port is used again. */
 let recording: Blob[] = [];
 let isBusy = false;
-/** The port is closed as soon as everything is seen to stand still. */
+/** The port is closed as soon as everything is seen at standstill. */
 let isClosing = false;
-/** A line was lost or closed while something may have moved: the next session begins with a stop. */
-let isStopOwed = false;
+/**
+ * What may have been moving when a line was lost or closed, and was not seen at standstill since:
+ * the next session begins with a stop. A rover has the id 0.
+ */
+const owed: Record<Kind, Set<number>> = { bus: new Set(), rover: new Set() };
 
 const protocol = (): "ucp" | "ikeya" | "ikeya-3" =>
   select("line-protocol").value as "ucp" | "ikeya" | "ikeya-3";
@@ -77,7 +81,10 @@ function showControls(): void {
   if (protocol() === "ikeya-3") button("line-connect").disabled = true;
   for (const field of [select("line-protocol"), input("line-baud"), select("line-dead-man")])
     field.disabled = isOpen || isBusy;
-  say(button("line-connect"), kind() === "bus" ? "Scan the bus" : "Connect to the rover");
+  say(
+    button("line-connect"),
+    kind() === "bus" ? "3. Scan the bus (moves nothing)" : "3. Connect to the rover",
+  );
   button("line-close").disabled = !isOpen;
   show(
     the("line-moving", HTMLElement),
@@ -115,7 +122,7 @@ async function choose(): Promise<void> {
     usbVendorId === undefined
       ? "a port"
       : `a USB adapter (${hex(usbVendorId)}:${hex(usbProductId ?? 0)})`;
-  say(words, `Chosen: ${name}. Listen first if you do not know what is on the line.`);
+  say(words, `Chosen: ${name}. Detect the protocol if you do not know what is on the line.`);
   showControls();
 }
 
@@ -197,6 +204,8 @@ function connect(): Promise<void> {
   return busy(async () => {
     const transport = await SerialTransport.open(port as SerialPort, baud());
     clear();
+    isClosing = false;
+    machineKind = kind();
     const story = new Story(the("line-story", HTMLElement));
     const deadMan = Number(select("line-dead-man").value) * 1000;
     machine =
@@ -206,8 +215,7 @@ function connect(): Promise<void> {
     machine.session.onclosed = lost;
     guard(machine);
     if (kind() === "bus") machine.session.order((role, now) => (role as Bus).discover(now));
-    if (isStopOwed) machine.disarm("When the last line ended, something may have moved: stop.");
-    isStopOwed = false;
+    if (owed[machineKind].size > 0) machine.stopWhatIsOwed(owed[machineKind]);
     say(
       words,
       kind() === "bus"
@@ -219,15 +227,26 @@ function connect(): Promise<void> {
 
 /** The line is gone while there may be motors that move. */
 function lost(reason: string): void {
-  if (machine) unguard(machine);
-  isStopOwed ||= machine?.isAtRisk() ?? false;
-  void machine?.session.close();
+  const isAtRisk = machine?.isAtRisk() ?? false;
+  if (machine) {
+    unguard(machine);
+    owe(machine);
+    void machine.session.close();
+  }
   machine = undefined;
+  isClosing = false;
   warn(
-    `${reason} The motors may still be moving: this page can no longer stop them. Cut their power if they move.`,
+    isAtRisk || owed[machineKind].size > 0
+      ? `${reason} The motors may still be moving: this page can no longer stop them. Cut their power if they move.`
+      : `${reason} Nothing was moving by an order from here.`,
   );
   say(words, "The line is gone. Below is what was last seen.");
   showControls();
+}
+
+/** Remembers what may be moving, for the next session. */
+function owe(machine: MovingMachine): void {
+  for (const id of machine.mayMove()) owed[machineKind].add(id);
 }
 
 /** Removes what an earlier line has left on the screen. */
@@ -243,20 +262,20 @@ async function close(): Promise<void> {
   if (machine?.isArmed) {
     isClosing = true;
     machine.disarm("Closing: all motors are told to stop.");
-    say(words, "The port is closed as soon as everything is seen to stand still.");
+    say(words, "The port is closed as soon as everything is seen at standstill.");
     return;
   }
   const isPending = machine?.isStopPending ?? false;
-  isStopOwed = isPending;
   await end();
   if (isPending)
-    warn("The port was closed before everything was seen to stand still: a motor may be moving.");
+    warn("The port was closed before everything was seen at standstill: a motor may be moving.");
 }
 
 async function end(): Promise<void> {
   isClosing = false;
   if (machine) {
     unguard(machine);
+    owe(machine);
     const { session } = machine;
     machine = undefined;
     await session.close();
@@ -288,6 +307,7 @@ function setArmed(isArmed: boolean): void {
 export function draw(): void {
   const isArmed = machine?.isArmed ?? false;
   if (machine) machine.show();
+  for (const id of machine?.standsStill() ?? []) owed[machineKind].delete(id);
   const isPending = machine?.isStopPending ?? false;
   if (isClosing && machine && !isPending) void end();
   arm.setAttribute("aria-checked", String(isArmed));
@@ -298,7 +318,7 @@ export function draw(): void {
       : isArmed
         ? "Armed: orders move motors."
         : isPending
-          ? "Disarmed, and waiting until the motors are seen to stand still."
+          ? "Disarmed, and waiting until the motors are seen at standstill."
           : "Disarmed: nothing can be set moving from here.",
   );
   say(

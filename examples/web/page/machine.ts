@@ -3,9 +3,22 @@
  * know when it is safe.
  * A simulated one cannot hurt anybody: it is always armed.
  */
-import { busStopWords, type BusSession, Motors, pendingStops } from "./motors.ts";
-import { Drive, isStopPending, type RoverSession, roverStopWords } from "./drive.ts";
-import type { Simulation } from "./contract.ts";
+import {
+  busStopWords,
+  type BusSession,
+  isBusAlarming,
+  mayMove,
+  Motors,
+  pendingStops,
+} from "./motors.ts";
+import {
+  Drive,
+  isRoverAlarming,
+  isStopPending,
+  type RoverSession,
+  roverStopWords,
+} from "./drive.ts";
+import { isPending, type Simulation } from "./contract.ts";
 import { say, show } from "./dom.ts";
 import { Session, type Transport } from "./session.ts";
 import type { Machine } from "./stopping.ts";
@@ -20,21 +33,44 @@ export interface Places {
   refused: HTMLElement;
 }
 
+/** What of it is to be seen at a glance. */
+interface Picture {
+  /** How far the stop has come. */
+  words: string;
+  isPending: boolean;
+  isAlarming: boolean;
+  /** Of motors, their ids; of a rover, 0: what may be moving, and what was stopped. */
+  mayMove: number[];
+  standsStill: number[];
+}
+
+const ROVER = 0;
+
 export class MovingMachine implements Machine {
   isArmed: boolean;
-  /** As of the last picture. */
-  isStopPending = false;
   /** Somebody has pressed STOP. */
   wasStopped = false;
-  private stopWords = "";
+  private picture: Picture = {
+    words: "",
+    isPending: false,
+    isAlarming: false,
+    mayMove: [],
+    standsStill: [],
+  };
 
   private constructor(
     readonly session: BusSession | RoverSession,
-    private readonly picture: (mayMove: boolean) => { words: string; isPending: boolean },
+    private readonly draw: () => Picture,
+    private readonly stopOne: (id: number) => void,
     readonly story: Story,
     private readonly isSimulated: boolean,
   ) {
     this.isArmed = isSimulated;
+  }
+
+  /** As of the last picture. */
+  get isStopPending(): boolean {
+    return this.picture.isPending;
   }
 
   static bus(
@@ -51,13 +87,25 @@ export class MovingMachine implements Machine {
       (bus, now) => bus.stop_all(now),
       (bus, now) => bus.keep_alive(now),
     );
-    const motors = new Motors(places.cards, session, (why) => refuse(places, why), simulation);
-    const picture = (mayMove: boolean) => {
+    const isArmed = () => machine.isArmed;
+    const say = (why: string) => refuse(places, why);
+    const motors = new Motors(places.cards, session, isArmed, say, simulation);
+    const draw = () => {
       const state = session.state();
-      motors.show(state, mayMove);
-      return { words: busStopWords(state), isPending: pendingStops(state).length > 0 };
+      motors.show(state);
+      return {
+        words: busStopWords(state),
+        isPending: pendingStops(state).length > 0,
+        isAlarming: isBusAlarming(state),
+        mayMove: mayMove(state),
+        standsStill: state.nodes
+          .filter(({ stop }) => stop === "standing_still")
+          .map(({ id }) => id),
+      };
     };
-    return new MovingMachine(session, picture, story, simulation !== undefined);
+    const stop = (id: number) => session.order((bus, now) => bus.stop(id, now));
+    const machine = new MovingMachine(session, draw, stop, story, simulation !== undefined);
+    return machine;
   }
 
   static rover(
@@ -73,25 +121,54 @@ export class MovingMachine implements Machine {
       (rover, now) => rover.stop(now),
       (rover, now) => rover.keep_alive(now),
     );
-    const drive = new Drive(places.cards, session, (why) => refuse(places, why), simulation);
-    const picture = (mayMove: boolean) => {
+    const isArmed = () => machine.isArmed;
+    const say = (why: string) => refuse(places, why);
+    const drive = new Drive(places.cards, session, isArmed, say, simulation);
+    const draw = () => {
       const state = session.state();
-      drive.show(state, mayMove);
-      return { words: roverStopWords(state), isPending: isStopPending(state) };
+      drive.show(state);
+      return {
+        words: roverStopWords(state),
+        isPending: isStopPending(state),
+        isAlarming: isRoverAlarming(state),
+        mayMove: isPending(state.stop) || state.stop === "not_asked" ? [ROVER] : [],
+        standsStill: state.stop === "standing_still" && state.link === "up" ? [ROVER] : [],
+      };
     };
-    return new MovingMachine(session, picture, story, simulation !== undefined);
+    const stop = () => session.order((rover, now) => rover.stop(now));
+    const machine = new MovingMachine(session, draw, stop, story, simulation !== undefined);
+    return machine;
   }
 
   /** Draws what is so now. */
   show(): void {
     if (this.session.closedBecause !== undefined) return;
-    const { words, isPending } = this.picture(this.isArmed);
-    this.stopWords = words;
-    this.isStopPending = isPending;
+    this.picture = this.draw();
     const events = this.session.events();
     this.story.add(events);
     if (this.isArmed && !this.isSimulated && events.some(({ event }) => event === "dead_man"))
       this.disarm("Disarmed: nobody has touched anything.");
+  }
+
+  /** What may be moving now, also when the line is gone. */
+  mayMove(): number[] {
+    try {
+      this.picture = this.draw();
+    } catch {
+      // The page has failed: the last picture is what is known.
+    }
+    return this.picture.mayMove;
+  }
+
+  /** What was seen at standstill behind a stop. */
+  standsStill(): number[] {
+    return this.picture.standsStill;
+  }
+
+  /** Stops what an earlier session could not, whether or not it was heard yet. */
+  stopWhatIsOwed(ids: Iterable<number>): void {
+    this.disarm("When the last session ended, something may have moved: stop.");
+    for (const id of ids) this.stopOne(id);
   }
 
   stop(): void {
@@ -118,7 +195,11 @@ export class MovingMachine implements Machine {
   }
 
   words(): string {
-    return `${this.isSimulated ? "Simulation" : "The line"}: ${this.stopWords}`;
+    return `${this.isSimulated ? "Simulation" : "The line"}: ${this.picture.words}`;
+  }
+
+  isAlarming(): boolean {
+    return this.picture.isAlarming;
   }
 }
 

@@ -19,8 +19,8 @@ export type BusSession = Session<Bus, BusState>;
 
 const HEALTH_WORDS: Record<BusNode["health"], string> = {
   online: "answers",
-  suspect: "does not answer at the moment",
-  abnormal: "does not answer",
+  suspect: "has missed an answer",
+  abnormal: "DOES NOT ANSWER",
   unknown: "not heard yet",
 };
 
@@ -39,24 +39,25 @@ export class Motors {
   constructor(
     private readonly place: HTMLElement,
     private readonly session: BusSession,
+    private readonly isArmed: () => boolean,
     private readonly refused: (why: string) => void,
     private readonly simulation?: Simulation,
   ) {
     place.replaceChildren();
   }
 
-  show(state: BusState, mayMove: boolean): void {
+  show(state: BusState): void {
     for (const node of state.nodes) {
       const isThere = node.mode !== null || isPending(node.stop);
       if (!isThere) continue;
       if (this.cards.get(node.id)?.node.mode !== node.mode) this.add(node);
-      this.cards.get(node.id)?.show(node, mayMove, this.simulation?.truth());
+      this.cards.get(node.id)?.show(node, this.simulation?.truth());
     }
   }
 
   private add(node: BusNode): void {
     this.cards.get(node.id)?.element.remove();
-    const card = new MotorCard(node, this.session, this.refused, this.simulation);
+    const card = new MotorCard(node, this.session, this.isArmed, this.refused, this.simulation);
     this.cards.set(node.id, card);
     const next = [...this.cards.keys()].filter((id) => id > node.id).sort((a, b) => a - b)[0];
     this.place.insertBefore(
@@ -79,13 +80,14 @@ class MotorCard {
   constructor(
     readonly node: BusNode,
     private readonly session: BusSession,
+    private readonly isArmed: () => boolean,
     private readonly refused: (why: string) => void,
     simulation: Simulation | undefined,
   ) {
     const name = `Motor ${node.id}`;
     const isSpeed = node.mode !== "position";
     this.goal.value = isSpeed ? "1" : "2";
-    this.turn.append(isSpeed ? "Turn" : "Go", make("span", { class: "spoken" }, ` (${name})`));
+    this.turn.append(isSpeed ? "Run" : "Go", make("span", { class: "spoken" }, ` (${name})`));
     const halt = make(
       "button",
       { type: "button" },
@@ -96,7 +98,7 @@ class MotorCard {
     const orders = make(
       "form",
       { class: "orders", novalidate: "" },
-      make("label", {}, isSpeed ? "turns/s " : "to turn ", this.goal),
+      make("label", {}, isSpeed ? "turns/s " : "to position ", this.goal),
       this.turn,
       halt,
     );
@@ -108,13 +110,13 @@ class MotorCard {
     const fact = (term: string, value: HTMLElement) =>
       facts.append(make("div", {}, make("dt", {}, term), value));
     if (simulation) fact("Really", this.really);
-    fact("Bus says", this.reported);
-    fact("Cable", this.health);
+    fact("Reported", this.reported);
+    fact("Link", this.health);
     fact("Stop", this.stop);
     this.element = make(
       "li",
       { class: "card" },
-      make("h3", {}, name, " ", make("small", {}, isSpeed ? "holds a speed" : "holds a position")),
+      make("h3", {}, name, " ", make("small", {}, isSpeed ? "speed control" : "position control")),
     );
     if (simulation) {
       this.disc = new Disc();
@@ -125,20 +127,23 @@ class MotorCard {
       this.element.append(plug(name, (isUnplugged) => simulation.unplug(node.id, isUnplugged)));
   }
 
-  show(node: BusNode, mayMove: boolean, truth: Truth | undefined): void {
+  show(node: BusNode, truth: Truth | undefined): void {
     const real = truth?.nodes?.find(({ id }) => id === node.id);
     if (real) {
       this.disc?.turnTo(real.turns);
-      say(this.really, `${real.rps.toFixed(2)} turns/s`);
+      const position = node.mode === "position" ? `${real.turns.toFixed(2)} turns, ` : "";
+      say(this.really, `${position}${real.rps.toFixed(2)} turns/s`);
     }
     say(this.reported, report(node));
     say(this.health, HEALTH_WORDS[node.health] ?? node.health);
     say(this.stop, STOP_WORDS[node.stop]);
     this.element.dataset.stop = node.stop;
-    if (this.turn.disabled === mayMove) this.turn.disabled = !mayMove;
+    this.element.dataset.link = node.health;
+    if (this.turn.disabled === this.isArmed()) this.turn.disabled = !this.isArmed();
   }
 
   private move(): void {
+    if (!this.isArmed()) return this.refused("Not armed. Nothing was sent.");
     const goal = numberIn(this.goal, -MOST, MOST);
     if (goal === undefined)
       return this.refused(
@@ -165,9 +170,9 @@ function report(node: BusNode): string {
 
 /** A plug that can be pulled. */
 export function plug(name: string, pull: (isUnplugged: boolean) => void): HTMLElement {
-  const box = make("input", { type: "checkbox", "aria-label": `Plug of ${name} pulled` });
+  const box = make("input", { type: "checkbox", "aria-label": `Unplug ${name}` });
   box.addEventListener("change", () => pull(box.checked));
-  return make("label", { class: "plug" }, box, " plug pulled");
+  return make("label", { class: "plug" }, box, " unplug this motor");
 }
 
 /** Nodes whose stop was asked for and has not ended yet. */
@@ -181,15 +186,33 @@ const movingWithoutOrder = (state: BusState): number[] =>
     .filter(({ stop }) => stop === "not_asked" || stop === "standing_still")
     .map(({ id }) => id);
 
-/** How far the stop of a bus has come, in one sentence. */
+/** How far the stop of a bus has come, the worst first. */
 export function busStopWords(state: BusState): string {
-  const names = (progress: BusNode["stop"]) =>
-    state.nodes.filter((node) => node.stop === progress).map((node) => node.id);
-  const parts = (["still_moving", "owed", "confirmed", "standing_still"] as const)
-    .filter((progress) => names(progress).length > 0)
-    .map((progress) => `Motor ${names(progress).join(", ")}: ${STOP_WORDS[progress]}.`);
-  const moving = movingWithoutOrder(state);
-  if (moving.length > 0)
-    parts.unshift(`Motor ${moving.join(", ")} MOVES without an order from here: press STOP.`);
-  return parts.length > 0 ? parts.join(" ") : "No stop was asked for.";
+  const parts: string[] = [];
+  const tell = (ids: number[], what: string) =>
+    ids.length > 0 && parts.push(`Motor ${ids.join(", ")} ${what}.`);
+  const ids = (those: (node: BusNode) => boolean) => state.nodes.filter(those).map(({ id }) => id);
+  const isLost = ({ stop, health }: BusNode) => isPending(stop) && health === "abnormal";
+  tell(movingWithoutOrder(state), "MOVES without an order from here: press STOP");
+  tell(ids(isLost), "is NOT seen to stop: it does not answer, and may be moving");
+  for (const progress of ["still_moving", "owed", "confirmed", "standing_still"] as const)
+    tell(
+      ids((node) => node.stop === progress && !isLost(node)),
+      `(stop): ${STOP_WORDS[progress]}`,
+    );
+  return parts.length > 0 ? parts.join(" ") : "No stop is in progress.";
 }
+
+/** What may be moving by an order from here, or without one. */
+export const mayMove = (state: BusState): number[] =>
+  state.nodes
+    .filter(({ stop, target }) => isPending(stop) || target !== null)
+    .map(({ id }) => id)
+    .concat(movingWithoutOrder(state));
+
+/** Something may move although it was told to stop, or without an order from here. */
+export const isBusAlarming = (state: BusState): boolean =>
+  movingWithoutOrder(state).length > 0 ||
+  state.nodes.some(
+    ({ stop, health }) => stop === "still_moving" || (isPending(stop) && health === "abnormal"),
+  );

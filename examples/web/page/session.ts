@@ -127,7 +127,7 @@ export class Session<R extends Role, State> {
   }
 
   async close(): Promise<void> {
-    this.transport.onclosed = () => {};
+    this.transport.onclosed = this.onclosed = () => {};
     this.closed("The line was closed.");
     await this.transport.close();
     this.isFreed = true;

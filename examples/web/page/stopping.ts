@@ -15,6 +15,8 @@ export interface Machine {
   isAtRisk(): boolean;
   /** How far the stop has come, in a few words. */
   words(): string;
+  /** It may be moving against an order, or without one. */
+  isAlarming(): boolean;
 }
 
 const machines = new Set<Machine>();
@@ -35,6 +37,10 @@ export function unguard(machine: Machine): void {
 /** Called with each picture that the page draws. */
 export function showStop(): void {
   say(words, [...machines].map((machine) => machine.words()).join(" "));
+  words.classList.toggle(
+    "alarming",
+    [...machines].some((machine) => machine.isAlarming()),
+  );
 }
 
 function stopAll(): void {

@@ -54,7 +54,7 @@ function begin(module: WebAssembly.Module, kind: Kind): void {
   input("try-noise").value = "0";
   input("try-cable").checked = false;
   showNoise();
-  say(hint, "The simulated line is starting …");
+  say(hint, "The simulation is starting …");
   guard(machine);
 }
 
@@ -81,8 +81,8 @@ export function draw(): void {
   say(
     hint,
     wasPending
-      ? "What was stopped is seen to stand still. Set it moving again, with noise or a pulled plug."
-      : "STOP: it is repeated until what was stopped is seen to stand still.",
+      ? "Stopped, and seen at standstill. Try it again with noise, or with a motor unplugged."
+      : "A stop is sent again and again until standstill is seen.",
   );
 }
 
@@ -105,12 +105,12 @@ function runAway(): void {
       )
         return;
       session.order((role, now) => (role as Bus).set_velocity(RUNAWAY.node, RUNAWAY.rps, now));
-      say(hint, "Motor 1 is running. Press STOP (or the space bar), or pull its plug and watch.");
+      say(hint, "Motor 1 is running. Press STOP (or the space bar), or unplug it and watch.");
     } else {
       if (machine.isStopPending || (session.state() as RoverState).link !== "up") return;
       say(
         hint,
-        "This rover stands. Drive it, then press STOP (or the space bar), or pull its cable while it drives.",
+        "The rover is standing still. Drive it, then press STOP (or the space bar), or unplug its cable while it drives.",
       );
     }
     simulation.isRunaway = true;

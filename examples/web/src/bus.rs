@@ -4,7 +4,7 @@ use axlewire::{
     ikeya::{
         Master, NodeId, Position, Rps, WriteRequest,
         board::{Status, Target},
-        master::{Cause, Health, MasterConfig, MasterEvent, Polling, StopProgress},
+        master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
     time::Duration,
 };
@@ -52,7 +52,10 @@ impl Bus {
         config.dead_man = Some(span(dead_man_ms));
         // The clock of a page has steps of 100 µs.
         config.accepts_early = true;
-        let session = Session::new(Master::new(config, instant(now)), told, now);
+        let mut lost = NodeSet::default();
+        let news =
+            move |t, event: &MasterEvent| told(t, event).filter(|_| is_news(event, &mut lost));
+        let session = Session::new(Master::new(config, instant(now)), news, now);
         Self { session, is_stopped: false, is_search_due: false }
     }
 
@@ -222,15 +225,31 @@ fn id(node: u8) -> Result<NodeId, JsError> {
     NodeId::new(node).map_err(thrown)
 }
 
+/// Only a node that was lost answers again: on a noisy line, every other answer is missed.
+fn is_news(event: &MasterEvent, lost: &mut NodeSet) -> bool {
+    match event {
+        MasterEvent::Health { node, health: Health::Online } => {
+            let was_lost = lost.contains(*node);
+            lost.remove(*node);
+            was_lost
+        }
+        MasterEvent::Health { node, health: Health::Abnormal } => {
+            lost.insert(*node);
+            true
+        }
+        _ => true,
+    }
+}
+
 /// An event as a sentence; a status is none, since it is a part of the state.
 fn told(t: f64, event: &MasterEvent) -> Option<Value> {
     let (name, node, text) = match event {
         MasterEvent::Discovered { node, mode } => {
-            ("discovered", Some(node), format!("node {node} found, {mode} mode"))
+            ("discovered", Some(node), format!("motor {node} found, {mode} control"))
         }
         MasterEvent::DiscoveryDone { online } => {
-            let nodes = if *online == 1 { "node" } else { "nodes" };
-            ("discovery_done", None, format!("scan done: {online} {nodes}"))
+            let motors = if *online == 1 { "motor" } else { "motors" };
+            ("discovery_done", None, format!("scan done: {online} {motors}"))
         }
         MasterEvent::ReadFailed { node, cause } => {
             let why = match cause {
@@ -238,43 +257,45 @@ fn told(t: f64, event: &MasterEvent) -> Option<Value> {
                 Cause::Damaged => "damaged bytes",
                 _ => "no answer of its own",
             };
-            ("read_failed", Some(node), format!("node {node}: {why}"))
+            ("read_failed", Some(node), format!("motor {node}: {why}"))
         }
         MasterEvent::Health { node, health } => {
             let text = match health {
-                Health::Online => "answers",
+                Health::Online => "answers again",
                 Health::Suspect(_) => return None,
                 Health::Abnormal => {
-                    "does not answer any more: it may be moving, and is told to stop"
+                    "does not answer any more. If it was moving, it is stopped when it answers"
                 }
             };
-            ("health", Some(node), format!("node {node} {text}"))
+            ("health", Some(node), format!("motor {node} {text}"))
         }
         MasterEvent::ModeChanged { node, mode } => {
-            ("mode_changed", Some(node), format!("node {node} is in {mode} mode now"))
+            ("mode_changed", Some(node), format!("motor {node} is under {mode} control now"))
         }
         MasterEvent::ModeInDoubt { node } => {
-            ("mode_in_doubt", Some(node), format!("node {node}: its mode is in doubt"))
+            ("mode_in_doubt", Some(node), format!("motor {node}: its mode is in doubt"))
         }
         MasterEvent::StopBlocked { node } => {
             let text = "cannot be told to stop yet: its mode is not known";
-            ("stop_blocked", Some(node), format!("node {node} {text}"))
+            ("stop_blocked", Some(node), format!("motor {node} {text}"))
         }
         MasterEvent::Stopped { node } => {
-            ("stopped", Some(node), format!("node {node} has confirmed its stop"))
+            ("stopped", Some(node), format!("motor {node} has confirmed its stop"))
         }
         MasterEvent::StandingStill { node } => {
-            ("standing_still", Some(node), format!("node {node} is seen to stand still"))
+            ("standing_still", Some(node), format!("motor {node} is seen at standstill"))
         }
         MasterEvent::StillMoving { node, .. } => {
-            let text = "was told to stop, and still moves";
-            ("still_moving", Some(node), format!("node {node} {text}"))
+            let text = "has confirmed its stop, and STILL MOVES";
+            ("still_moving", Some(node), format!("motor {node} {text}"))
         }
-        MasterEvent::DeadMan => {
-            ("dead_man", None, "nobody was there: all motors are stopped".to_owned())
-        }
+        MasterEvent::DeadMan => (
+            "dead_man",
+            None,
+            "nobody has touched anything: all motors are told to stop".to_owned(),
+        ),
         MasterEvent::NotConfirmed { node, .. } => {
-            ("not_confirmed", Some(node), format!("node {node} has not confirmed its command"))
+            ("not_confirmed", Some(node), format!("motor {node} has not confirmed its command"))
         }
         // Status, and a command that was confirmed.
         _ => return None,

@@ -154,14 +154,20 @@ fn report(report: &ReceivedReport) -> Option<Value> {
 fn told(t: f64, event: &HostEvent) -> Option<Value> {
     let (name, text) = match event {
         HostEvent::LinkUp => ("link_up", "the rover is heard"),
-        HostEvent::LinkDown => {
-            ("link_down", "the rover is not heard any more: it may be moving, and is told to stop")
+        HostEvent::LinkDown => (
+            "link_down",
+            "the rover is not heard any more: it may be moving, and is told to stop until it answers",
+        ),
+        HostEvent::DeadMan => {
+            ("dead_man", "nobody has touched anything: the rover is told to stop")
         }
-        HostEvent::DeadMan => ("dead_man", "nobody was there: the rover is told to stop"),
-        HostEvent::BiasesSent => ("biases_sent", "the rover has booted, and has its biases"),
-        HostEvent::BiasesMissing { .. } => {
-            ("biases_missing", "the rover has booted, and asks for biases: there are none")
+        HostEvent::BiasesSent => {
+            ("biases_sent", "the rover has started, and has the offsets of its sensors (biases)")
         }
+        HostEvent::BiasesMissing { .. } => (
+            "biases_missing",
+            "the rover has started, and asks for the offsets of its sensors (biases): none are kept here",
+        ),
         HostEvent::Unknown(_) => ("unknown", "a frame that this page does not know"),
         _ => return None,
     };

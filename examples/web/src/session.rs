@@ -19,7 +19,7 @@ const BACKLOG: Duration = Duration::from_millis(100);
 const MOST_EVENTS: usize = 1000;
 
 /// An event at a time as a sentence for people, if it is worth one.
-type Told<E> = fn(f64, &E) -> Option<Value>;
+type Told<E> = Box<dyn FnMut(f64, &E) -> Option<Value>>;
 
 /// A role, and what it has reported.
 pub(crate) struct Session<R: Endpoint> {
@@ -44,8 +44,18 @@ pub(crate) fn span(ms: f64) -> Duration {
 }
 
 impl<R: Endpoint> Session<R> {
-    pub(crate) fn new(role: R, told: Told<R::Event>, now: f64) -> Self {
-        Self { role, told, events: VecDeque::new(), turn: instant(now), held_up: None }
+    pub(crate) fn new(
+        role: R,
+        told: impl FnMut(f64, &R::Event) -> Option<Value> + 'static,
+        now: f64,
+    ) -> Self {
+        Self {
+            role,
+            told: Box::new(told),
+            events: VecDeque::new(),
+            turn: instant(now),
+            held_up: None,
+        }
     }
 
     /// Takes in received bytes. If the page was held up, they may have waited.

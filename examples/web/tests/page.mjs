@@ -167,9 +167,9 @@ async function stopIsSeenToStandStill() {
   const page = await open();
   await says(page.locator("#try-hint"), "Motor 1 is running");
   await page.locator("#stop").click();
-  await says(card(page, "Motor 1"), "seen to stand still");
-  await says(page.locator("#try-story"), /is seen to stand still/);
-  await says(page.locator("#stop-words"), /Motor 1.*seen to stand still/);
+  await says(card(page, "Motor 1"), "seen at standstill");
+  await says(page.locator("#try-story"), /is seen at standstill/);
+  await says(page.locator("#stop-words"), /Motor 1.*seen at standstill/);
   await shot(page, "try-stopped");
   await close(page);
 }
@@ -178,12 +178,12 @@ async function spaceStopsAlsoOnAButton() {
   const page = await open();
   await says(page.locator("#try-hint"), "Motor 1 is running");
   await until(async () => (await page.locator("#try .card").count()) === 8, "eight motors");
-  await card(page, "Motor 2").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 2").getByRole("button", { name: "Run" }).click();
   await says(card(page, "Motor 2"), /Really\s*(0\.9|1\.0)/);
-  await card(page, "Motor 2").getByRole("button", { name: "Turn" }).focus();
+  await card(page, "Motor 2").getByRole("button", { name: "Run" }).focus();
   await page.keyboard.press("Space");
-  await says(card(page, "Motor 1"), "seen to stand still");
-  await says(card(page, "Motor 2"), "seen to stand still");
+  await says(card(page, "Motor 1"), "seen at standstill");
+  await says(card(page, "Motor 2"), "seen at standstill");
   await close(page);
 }
 
@@ -191,18 +191,18 @@ async function aPulledPlugAndNoise() {
   const page = await open();
   await says(page.locator("#try-hint"), "Motor 1 is running");
   await says(card(page, "Motor 1"), /Really\s*(0\.9|1\.0)/);
-  await page.getByRole("checkbox", { name: "Plug of Motor 1 pulled" }).focus();
+  await page.getByRole("checkbox", { name: "Unplug Motor 1" }).focus();
   await page.keyboard.press("Enter");
-  await says(card(page, "Motor 1"), "does not answer");
+  await says(card(page, "Motor 1"), "DOES NOT ANSWER");
   await page.locator("#stop").click();
-  await says(card(page, "Motor 1"), "asked, waiting");
+  await says(card(page, "Motor 1"), "no answer yet: it may be moving");
   await wait(500);
   await says(card(page, "Motor 1"), /Really\s*(0\.9|1\.0)/);
   await shot(page, "try-unplugged");
   await page.locator("#try-noise").fill("4");
   await says(page.locator("#try-noise-words"), "1 wrong bit in 1,000");
-  await page.getByRole("checkbox", { name: "Plug of Motor 1 pulled" }).uncheck();
-  await says(card(page, "Motor 1"), "seen to stand still", 10_000);
+  await page.getByRole("checkbox", { name: "Unplug Motor 1" }).uncheck();
+  await says(card(page, "Motor 1"), "seen at standstill", 10_000);
   await says(card(page, "Motor 1"), /Really\s*-?0\.0/);
   await close(page);
 }
@@ -211,22 +211,22 @@ async function refusedOrdersAreSaid() {
   const page = await open();
   await until(async () => (await page.locator("#try .card").count()) === 8, "eight motors");
   await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("1e9");
-  await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 3").getByRole("button", { name: "Run" }).click();
   await page.locator("#try-refused").waitFor();
   for (const text of ["1e9", "1 5", "--5", "0x10", "51", "1,5,5", "NaN"]) {
     await card(page, "Motor 3").locator("input[inputmode=decimal]").fill(text);
-    await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+    await card(page, "Motor 3").getByRole("button", { name: "Run" }).click();
     await says(page.locator("#try-refused"), "Nothing was sent");
   }
   await wait(300);
   await says(card(page, "Motor 3"), /Really\s*0\.00/);
   await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("1,5");
-  await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 3").getByRole("button", { name: "Run" }).click();
   await says(card(page, "Motor 3"), /Really\s*1\.[45]/);
   await card(page, "Motor 3").getByRole("button", { name: "Stop" }).click();
-  await says(card(page, "Motor 3"), "seen to stand still");
+  await says(card(page, "Motor 3"), "seen at standstill");
   await card(page, "Motor 3").locator("input[inputmode=decimal]").fill("");
-  await card(page, "Motor 3").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 3").getByRole("button", { name: "Run" }).click();
   await page.locator("#try-refused").waitFor();
   await wait(300);
   await says(card(page, "Motor 3"), /Really\s*0\.00/);
@@ -236,7 +236,7 @@ async function refusedOrdersAreSaid() {
 async function theRoverDrivesAndStops() {
   const page = await open("#try?on=rover");
   const rover = card(page, "Rover");
-  await says(page.locator("#try-hint"), "This rover stands");
+  await says(page.locator("#try-hint"), "The rover is standing still");
   await rover.getByRole("button", { name: "Drive" }).click();
   await says(rover, /wheels (3\d|[4-9]\d)/);
   await shot(page, "try-rover");
@@ -409,6 +409,11 @@ async function aMillionRowsAndNonsense() {
       ) < 100,
     "the middle is shown",
   );
+  await page.locator("#capture-text").fill("nothing has this");
+  await says(page.locator("#capture-shown"), "Searching");
+  assert.ok(await page.locator("#export-json").isDisabled(), "what is saved is what is shown");
+  await page.locator("#capture-text").fill("");
+  await says(page.locator("#capture-shown"), "1,000,000 rows of", 60_000);
   let saved = 0;
   page.on("download", () => (saved += 1));
   await page.locator("#export-json").click();
@@ -495,14 +500,14 @@ async function aRealLineScanArmSpinStopUnplug() {
   const page = await scanned(simulator);
   const motor = card(page, "Motor 1");
   assert.ok(
-    await motor.getByRole("button", { name: "Turn" }).isDisabled(),
+    await motor.getByRole("button", { name: "Run" }).isDisabled(),
     "nothing moves before it is armed",
   );
   assert.ok(await page.locator("#stop").isVisible());
   await page.locator("#line-arm").click();
-  await motor.getByRole("button", { name: "Turn" }).click();
+  await motor.getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs");
-  await says(motor, /Bus says\s*(0\.9|1\.0)/);
+  await says(motor, /Reported\s*(0\.9|1\.0)/);
   await shot(page, "line");
   await page.locator("#to-capture").click();
   await page.keyboard.press("Space");
@@ -511,14 +516,14 @@ async function aRealLineScanArmSpinStopUnplug() {
     "the motor stands, stopped from another view",
   );
   await page.locator("#to-line").click();
-  await says(motor, "seen to stand still");
-  await motor.getByRole("button", { name: "Turn" }).click();
+  await says(motor, "seen at standstill");
+  await motor.getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs again");
   await page.locator("#line-arm").click();
   await until(() => Math.abs(turns(simulator)) < 0.05, "disarming stops");
   await says(page.locator("#line-arm-words"), "Disarmed: nothing");
   await page.locator("#line-arm").click();
-  await motor.getByRole("button", { name: "Turn" }).click();
+  await motor.getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs once more");
   await page.pull();
   await says(page.locator("#line-alarm"), "may still be moving");
@@ -532,7 +537,7 @@ async function aLostMotorIsStoppedWhenTheLineIsBack() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   const page = await scanned(simulator);
   await page.locator("#line-arm").click();
-  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs");
   await page.pull();
   await says(page.locator("#line-alarm"), "may still be moving");
@@ -541,7 +546,78 @@ async function aLostMotorIsStoppedWhenTheLineIsBack() {
   await page.locator("#line-choose").click();
   await page.locator("#line-connect").click();
   await until(() => Math.abs(turns(simulator)) < 0.05, "it is stopped");
-  await says(card(page, "Motor 1"), "seen to stand still");
+  await says(card(page, "Motor 1"), "seen at standstill");
+  await page.locator("#line-close").click();
+  await says(page.locator("#line-words"), "The port is closed");
+  assert.equal(await text(page, "#line-alarm"), "", "an ordinary end is no alarm");
+  await close(page);
+}
+
+/** Also if another session comes between that only watches, or is lost while it closes. */
+async function aStopStaysOwedUntilStandstillIsSeen() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const page = await scanned(simulator);
+  const time = setInterval(() => simulator.read(performance.now()), 50);
+  const plugIn = async () => {
+    await page.evaluate(() => void window.plugIn());
+    await page.locator("#line-choose").click();
+  };
+  const run = async () => {
+    await page.locator("#line-arm").click();
+    await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
+    await until(() => turns(simulator) > 0.9, "the motor runs");
+  };
+  await run();
+  await page.pull();
+  await says(page.locator("#line-alarm"), "may still be moving");
+  await plugIn();
+  await page.locator("#line-watch").click();
+  await says(page.locator("#line-words"), "Watching");
+  await page.locator("#line-close").click();
+  await says(page.locator("#line-words"), "The port is closed");
+  simulator.unplug(1, true);
+  await page.locator("#line-connect").click();
+  await says(page.locator("#stop-words"), "Motor 1 (stop): sent, no answer yet");
+  await page.locator("#line-close").click();
+  await says(page.locator("#line-alarm"), "a motor may be moving");
+  simulator.unplug(1, false);
+  await page.locator("#line-connect").click();
+  await says(card(page, "Motor 1"), "seen at standstill");
+  assert.ok(Math.abs(turns(simulator)) < 0.1, "it is stopped");
+
+  await run();
+  simulator.unplug(1, true);
+  await page.locator("#line-close").click();
+  await says(page.locator("#line-close"), "Close although a stop is pending");
+  await page.pull();
+  await says(page.locator("#line-alarm"), "may still be moving");
+  simulator.unplug(1, false);
+  await plugIn();
+  await page.locator("#line-connect").click();
+  await says(card(page, "Motor 1"), "seen at standstill");
+  assert.ok(Math.abs(turns(simulator)) < 0.1, "it is stopped");
+  assert.ok(await page.locator("#stop").isVisible(), "and the session goes on");
+  clearInterval(time);
+  await close(page);
+}
+
+/** Not even if the switch and the order come before the next picture. */
+async function aDisarmedRoverTakesNoOrder() {
+  const simulator = wasm.Simulator.rover(1, performance.now());
+  const page = await open("#line", { serial: simulator });
+  await page.locator("#line-choose").click();
+  await page.locator("#line-protocol").selectOption("ucp");
+  await page.locator("#line-connect").click();
+  const rover = card(page, "Rover");
+  await says(rover, "it stands still", 10_000);
+  await page.locator("#line-arm").click();
+  await rover.getByRole("button", { name: "Drive" }).evaluate((drive) => {
+    document.getElementById("line-arm").click();
+    drive.click();
+  });
+  await says(page.locator("#line-refused"), "Not armed");
+  await wait(500);
+  assert.ok(JSON.parse(simulator.state()).rover.rpm.every((rpm) => Math.abs(rpm) < 1));
   await close(page);
 }
 
@@ -561,7 +637,7 @@ async function aMotorThatNobodyHereHasMoved() {
   const page = await scanned(simulator);
   await says(page.locator("#stop-words"), "Motor 1 MOVES without an order from here");
   await page.keyboard.press("Space");
-  await says(card(page, "Motor 1"), "seen to stand still");
+  await says(card(page, "Motor 1"), "seen at standstill");
   await close(page);
 }
 
@@ -571,7 +647,7 @@ async function closingStopsFirst() {
   const closing = page.locator("#line-close");
   const run = async () => {
     await page.locator("#line-arm").click();
-    await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+    await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
     await until(() => turns(simulator) > 0.9, "the motor runs");
   };
   await run();
@@ -598,7 +674,7 @@ async function theDeadManDisarms() {
   await page.locator("#line-connect").click();
   await says(page.locator("#line-cards"), "Motor 1", 10_000);
   await page.locator("#line-arm").click();
-  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs");
   await says(page.locator("#line-story"), "nobody has touched anything", 5000);
   await says(page.locator("#line-arm-words"), "Disarmed");
@@ -610,7 +686,7 @@ async function aHiddenPageStops() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   const page = await scanned(simulator);
   await page.locator("#line-arm").click();
-  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs");
   await page.evaluate(() => {
     Object.defineProperty(document, "visibilityState", { value: "hidden", configurable: true });
@@ -626,7 +702,7 @@ async function aClosedPageStopsAndWarns() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   const page = await scanned(simulator);
   await page.locator("#line-arm").click();
-  await card(page, "Motor 1").getByRole("button", { name: "Turn" }).click();
+  await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "the motor runs");
   const [dialog] = await Promise.all([
     page.waitForEvent("dialog"),
@@ -666,8 +742,8 @@ async function theFakePlugIsPulledInEachState() {
     await wait(50);
     await page.pull();
     await says(page.locator("#line-alarm"), /unplugged/i);
-    if (!["listening", "watching"].includes(name))
-      await says(page.locator("#line-alarm"), "may still be moving");
+    if (name === "armed") await says(page.locator("#line-alarm"), "may still be moving");
+    if (name === "scanning") await says(page.locator("#line-alarm"), "by an order from here");
     await until(
       () => page.locator("#line-choose").isEnabled(),
       `another port can be chosen after ${name}`,
@@ -733,7 +809,7 @@ async function axeFindsNothing() {
     const page = await open("#try", { scheme, serial: simulator });
     await says(page.locator("#try-hint"), "Motor 1 is running");
     await page.locator("#stop").click();
-    await says(card(page, "Motor 1"), "seen to stand still");
+    await says(card(page, "Motor 1"), "seen at standstill");
     await check(page, `try ${scheme}`);
     await page.locator("#try-kind").selectOption("rover");
     await says(card(page, "Rover"), "the rover reports");
@@ -812,6 +888,8 @@ const stories = [
   decodingIsCancelled,
   aRealLineScanArmSpinStopUnplug,
   aLostMotorIsStoppedWhenTheLineIsBack,
+  aStopStaysOwedUntilStandstillIsSeen,
+  aDisarmedRoverTakesNoOrder,
   aMotorThatNobodyHereHasMoved,
   closingStopsFirst,
   theDeadManDisarms,
