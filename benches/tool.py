@@ -164,7 +164,7 @@ def main():
     parser.add_argument("--goals", action="store_true", help="fail if a figure misses its goal")
     options = parser.parse_args()
     rounds = 1 if options.quick else 5
-    build = ["cargo", "build", "--release", "--quiet", "-p", "axle", "--features", "mcap,parquet"]
+    build = ["cargo", "build", "--release", "--quiet", "-p", "axlewire-cli"]
     subprocess.run(build, cwd=ROOT, check=True)
     missed = False
     for protocol, (make, *_) in PROTOCOLS.items():

@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bash examples/axle/tests/export.sh --install
-[ -n "${AXLE:-}" ] || cargo build --quiet -p axle --all-features
+[ -n "${AXLE:-}" ] || cargo build --quiet -p axlewire-cli --all-features
 python=$PWD/target/export/bin/python
 
 # Everything runs in a folder of its own, which is the home, too, with stand-ins for the windows.

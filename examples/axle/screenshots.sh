@@ -4,9 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 mkdir -p screenshots
-cargo test --quiet -p axle --bin axle -- --ignored --exact \
+cargo test --quiet -p axlewire-cli --bin axle -- --ignored --exact \
     watch::page::shots::write_the_pictures
 for name in motors drive; do
-    cargo run --quiet -p axle --features plot -- \
+    cargo run --quiet -p axlewire-cli --features plot -- \
         plot "../captures/$name.pcapng" --force -o "screenshots/$name.svg"
 done

@@ -22,7 +22,7 @@ WARN_AS_ERROR = FAIL_ON_WARNINGS
 END
 echo "OUTPUT_DIRECTORY = $target/doxygen") | doxygen -
 ./check_programs.sh
-cargo build --quiet --release -p axle
+cargo build --quiet --release -p axlewire-cli
 echo "== a node in QEMU"
 ./firmware/run.sh "$target/release/axle" spin -p PORT --node 1 --rps 2 --for 2 | tee "$target/c-node.log"
 grep -q '2.00 rps$' "$target/c-node.log"

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 if [ -z "${AXLE:-}" ]; then
-    cargo build --quiet -p axle --all-features
+    cargo build --quiet -p axlewire-cli --all-features
     AXLE=${CARGO_TARGET_DIR:-target}/debug/axle
 fi
 AXLE=$AXLE exec python3 examples/sigrok/check.py

@@ -16,7 +16,7 @@ npx prettier --print-width 100 --log-level warn --check index.html page tests vi
 if [ "${1-}" = --quick ]; then
     STORY='aMotorRuns|stopIsSeen|aCaptureIsListed' exec node tests/page.mjs "$page/index.html" "$shots"
 fi
-cargo build --quiet --release -p axle --manifest-path ../../Cargo.toml --target-dir "$target"
+cargo build --quiet --release -p axlewire-cli --manifest-path ../../Cargo.toml --target-dir "$target"
 node tests/roles.mjs
 node tests/values.mjs "$target/release/axle" "$target/web/scratch"
 node tests/page.mjs "$page/index.html" "$shots"

@@ -13,7 +13,7 @@ $venv/bin/pip install --quiet --disable-pip-version-check duckdb==2.0.1 jsonsche
     mcap==1.6.0 pandas==3.1.1 playwright==1.65.2 pyarrow==26.0.1
 [ "${1:-}" != --install ] || exit 0
 if [ -z "${AXLE:-}" ]; then
-    cargo build --quiet -p axle --all-features
+    cargo build --quiet -p axlewire-cli --all-features
     AXLE=${CARGO_TARGET_DIR:-target}/debug/axle
 fi
 AXLE=$AXLE exec $venv/bin/python examples/axle/tests/"${1:-export.py}"

@@ -3,7 +3,7 @@
 //! Nothing leaks, nothing stalls, and the reports keep their beat of 20 ms.
 //!
 //! ```sh
-//! AXLE_HOUR_MINUTES=60 cargo test --release -p axle --test hour -- --ignored --nocapture
+//! AXLE_HOUR_MINUTES=60 cargo test --release -p axlewire-cli --test hour -- --ignored --nocapture
 //! ```
 //!
 //! Without the variable it takes 30 seconds. The machine has other work to do: what the scheduler

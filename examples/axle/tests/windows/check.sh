@@ -154,9 +154,9 @@ target=x86_64-pc-windows-gnu
 programs=("$CARGO_TARGET_DIR/"{,cross/}"$target/debug/"{axle,rover}.exe)
 rm -f "${programs[@]}"
 export CARGO_PROFILE_DEV_DEBUG=0
-bash .ci/cross $target build --quiet -p axle -p host-examples --bin axle --bin rover
+bash .ci/cross $target build --quiet -p axlewire-cli -p host-examples --bin axle --bin rover
 bash .ci/cross $target check --quiet -p axlewire --lib --features serialport,tokio
-cargo build --quiet -p axle --bin axle
+cargo build --quiet -p axlewire-cli --bin axle
 
 FOLDER=$(mktemp -d)
 # A prefix of its own, so that no other program under wine is ended.
