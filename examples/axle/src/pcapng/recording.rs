@@ -182,6 +182,11 @@ impl Recording {
         Self::begin(Output::File(file), Path::new("file"), Protocol::Ucp, "port", 1).unwrap()
     }
 
+    /// The protocol of its line.
+    pub(crate) const fn protocol(&self) -> Protocol {
+        self.line.0
+    }
+
     /// The file that is written now.
     pub(crate) fn path(&self) -> &Path {
         &self.path
