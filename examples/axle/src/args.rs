@@ -53,7 +53,7 @@ pub(crate) fn baud() -> RangedI64ValueParser<u32> {
 }
 
 /// A file for a recording.
-fn recording() -> impl TypedValueParser<Value = PathBuf> {
+pub(crate) fn recording() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path == Path::new("-") {
         true => Err("standard output carries the lines of this subcommand: name a file"),
         false => Ok(path),

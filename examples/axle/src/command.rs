@@ -11,8 +11,8 @@ use crate::no_sim;
 #[cfg(unix)]
 use crate::sim;
 use crate::{
-    calibrate, decode, drive, export, extcap, failure::Failure, help::EXIT_CODES, lamp, manual,
-    network, ping, plot, ports, record, replay, scan, send, spin, stop, watch,
+    bugreport, calibrate, decode, drive, export, extcap, failure::Failure, help::EXIT_CODES, lamp,
+    manual, network, ping, plot, ports, record, replay, scan, send, spin, stop, watch,
 };
 
 /// Host tool for Ikeya MD and UCP lines
@@ -45,6 +45,7 @@ pub(crate) enum Command {
     #[cfg(unix)]
     Sim(sim::Args),
     Ports(ports::Args),
+    Bugreport(bugreport::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
     #[cfg(not(unix))]
@@ -108,6 +109,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
         Command::Ports(args) => ports::run(args),
+        Command::Bugreport(args) => bugreport::run(args),
         Command::Completions(args) => manual::print_completions(args, description()),
         Command::Man(args) => manual::write_pages(args, description()),
         #[cfg(not(unix))]

@@ -15,6 +15,8 @@ mod beside;
 #[cfg(not(target_family = "wasm"))]
 mod boards;
 #[cfg(not(target_family = "wasm"))]
+mod bugreport;
+#[cfg(not(target_family = "wasm"))]
 mod bus;
 #[cfg(not(target_family = "wasm"))]
 mod calibrate;

@@ -80,7 +80,7 @@ impl fmt::Display for Record {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Port { path, connection, usb } => {
-                write!(f, "{path:<20}  {connection}")?;
+                write!(f, "{:<20}  {connection}", path.escape_debug().to_string())?;
                 let Some(usb) = usb else { return Ok(()) };
                 write!(f, " {}:{}", usb.vendor_id, usb.product_id)?;
                 for name in [&usb.manufacturer, &usb.product].into_iter().flatten() {
@@ -107,6 +107,28 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         writeln!(out, "{}", form.plain(&record)).map_err(Failure::Write)?;
     }
     out.flush().map_err(Failure::Write)
+}
+
+/// The ports as lines for people who do not own them: without serial numbers.
+pub(crate) fn without_serial_numbers(ports: Vec<SerialPortInfo>) -> Vec<String> {
+    let line = |mut info: SerialPortInfo| {
+        info.port_name = short_name(&info.port_name);
+        if let SerialPortType::UsbPort(usb) = &mut info.port_type {
+            let number = usb.serial_number.take().filter(|number| !number.is_empty());
+            for name in [&mut usb.manufacturer, &mut usb.product] {
+                name.take_if(|name| number.as_ref().is_some_and(|it| name.contains(it)));
+            }
+        }
+        Record::from(info).to_string()
+    };
+    ports.into_iter().map(line).collect()
+}
+
+/// The last part of a path, up to what is neither a letter nor a digit: some systems and links put
+/// the serial number of an adapter behind that, or the name of a person or a machine.
+pub(crate) fn short_name(port: &str) -> String {
+    let name = port.rsplit(['/', '\\']).next().unwrap_or_default();
+    name.chars().take_while(char::is_ascii_alphanumeric).take(32).collect()
 }
 
 /// The ports of this machine, by name.
@@ -168,5 +190,29 @@ mod tests {
     fn the_summary_counts_the_ports() {
         let texts = [0, 1, 2].map(|ports| Record::Summary { ports }.to_string());
         assert_eq!(texts, ["No serial ports.", "1 serial port.", "2 serial ports."]);
+    }
+
+    #[test]
+    fn for_others_a_port_has_no_serial_number_no_owner_and_no_control_sequence() {
+        let bad = |text: &str| Some(text.to_owned());
+        let (serial_number, manufacturer) = (bad("A5\x1b7"), bad("F\x1b[2J\nTDI"));
+        let product = bad("UART A5\x1b7");
+        let usb = UsbPortInfo { serial_number, manufacturer, product, ..adapter() };
+        let ports = [
+            ("/dev/cu.usbserial-A5\x1b7", SerialPortType::UsbPort(usb)),
+            ("/dev/cu.Janes-iPhone", SerialPortType::BluetoothPort),
+            ("\x1b[2J", SerialPortType::Unknown),
+            ("COM3", SerialPortType::Unknown),
+        ];
+        let ports =
+            ports.map(|(name, port_type)| SerialPortInfo { port_name: name.to_owned(), port_type });
+        let expected = [
+            r"cu                    usb 0403:6001  F\u{1b}[2J\nTDI",
+            "cu                    bluetooth",
+            "                      unknown",
+            "COM3                  unknown",
+        ];
+        assert_eq!(without_serial_numbers(ports.into()), expected);
+        assert_eq!(short_name("tcp:jane.example:2000"), "tcp");
     }
 }

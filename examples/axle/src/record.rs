@@ -71,18 +71,6 @@ pub(crate) struct Args {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    match args.protocol {
-        Protocol::Ucp => record::<ucp::Ucp>(args),
-        Protocol::Ikeya => record::<ikeya::BothDirections>(args),
-        Protocol::Ikeya3 => record::<three::BothDirections>(args),
-    }
-}
-
-fn record<F>(args: &Args) -> Result<(), Failure>
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
     let signals = Signals::listen()?;
     let baud = args.baud.unwrap_or(args.protocol.default_baud());
     let is_piped = args.output == Path::new("-");
@@ -103,13 +91,13 @@ where
         eprintln!("axle: recording {:?} until Ctrl-C", args.port);
     }
     let end = args.micros.map(|micros| clock::now() + Duration::from_micros(micros));
-    let Recorded { account, files, outcome } = record_line::<F>(line, file, end, &signals);
+    let Recorded { account, file, outcome } = record_line(line, file, end, &signals);
     if !is_piped {
         let mut out = io::stdout().lock();
         let told = listing::print_summary(&mut out, &account, false);
-        told.and_then(|()| match files {
-            Some((1, only)) => writeln!(out, "{:>10} file, {only:?}", 1),
-            Some((count, last)) => writeln!(out, "{count:>10} files, the last is {last:?}"),
+        told.and_then(|()| match file.files() {
+            Some(1) => writeln!(out, "{:>10} file, {:?}", 1, file.path()),
+            Some(count) => writeln!(out, "{count:>10} files, the last is {:?}", file.path()),
             None => Ok(()),
         })
         .and_then(|()| out.flush())
@@ -128,13 +116,25 @@ fn is_name_of_files(path: &Path) -> bool {
 /// What has become of a recording.
 pub(crate) struct Recorded {
     account: Counters,
-    /// How many files there are, and the last, if there may be several.
-    files: Option<(u32, PathBuf)>,
+    pub(crate) file: Recording,
     pub(crate) outcome: Result<(), Failure>,
 }
 
 /// Records a line until `end`, a signal, or a failure of the file or the port.
-pub(crate) fn record_line<F>(
+pub(crate) fn record_line(
+    line: Line,
+    file: Recording,
+    end: Option<Instant>,
+    signals: &Signals,
+) -> Recorded {
+    match file.protocol() {
+        Protocol::Ucp => record_frames::<ucp::Ucp>(line, file, end, signals),
+        Protocol::Ikeya => record_frames::<ikeya::BothDirections>(line, file, end, signals),
+        Protocol::Ikeya3 => record_frames::<three::BothDirections>(line, file, end, signals),
+    }
+}
+
+fn record_frames<F>(
     mut line: Line,
     file: Recording,
     end: Option<Instant>,
@@ -159,9 +159,7 @@ where
         }
     };
     let recorded = recorded.and_then(|()| frames.finish());
-    let file = &frames.file;
-    let files = file.files().map(|count| (count, file.path().to_owned()));
-    Recorded { account: frames.account(), files, outcome: recorded.and(broken) }
+    Recorded { account: frames.account(), file: frames.file, outcome: recorded.and(broken) }
 }
 
 /// Cuts what is received into frames and the bytes between them, a packet each.

@@ -13,16 +13,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use axlewire::{
-    ikeya::{self, three},
-    stream::Framing,
-    ucp,
-};
 use clap::ValueEnum;
 
 use crate::{
-    args::Protocol, failure::Failure, help::EXIT_CODES, line::Line, listing::Shown,
-    pcapng::Recording, ports, record::record_line, signals::Signals,
+    args::Protocol, failure::Failure, help::EXIT_CODES, line::Line, pcapng::Recording, ports,
+    record::record_line, signals::Signals,
 };
 use say::{ANY_PORT, PREFIX};
 
@@ -174,11 +169,10 @@ fn capture(args: &Args) -> Result<(), Failure> {
         mem::forget(File::options().write(true).open(fifo));
     }
     let (line, fifo, protocol, baud) = prepared?;
-    match protocol {
-        Protocol::Ucp => capture_line::<ucp::Ucp>(line, fifo, protocol, baud),
-        Protocol::Ikeya => capture_line::<ikeya::BothDirections>(line, fifo, protocol, baud),
-        Protocol::Ikeya3 => capture_line::<three::BothDirections>(line, fifo, protocol, baud),
-    }
+    // Waits for a reader; a signal ends the process then, because nothing listens yet.
+    let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
+    let signals = Signals::listen()?;
+    record_line(line, file, None, &signals).outcome
 }
 
 /// The open line, the pipe, the protocol and the speed.
@@ -192,17 +186,6 @@ fn prepare(args: &Args) -> Result<(Line, &Path, Protocol, u32), Failure> {
     }
     let baud = args.baud(protocol)?;
     Ok((Line::connect(port, baud)?, fifo, protocol, baud))
-}
-
-fn capture_line<F>(line: Line, fifo: &Path, protocol: Protocol, baud: u32) -> Result<(), Failure>
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
-    // Waits for a reader; a signal ends the process then, because nothing listens yet.
-    let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
-    let signals = Signals::listen()?;
-    record_line::<F>(line, file, None, &signals).outcome
 }
 
 #[cfg(test)]

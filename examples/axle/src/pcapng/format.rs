@@ -7,6 +7,7 @@ pub(crate) const MAGIC: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 
 /// Types of blocks.
 pub(super) mod block {
+    pub(crate) const SECTION: u32 = u32::from_le_bytes(super::MAGIC);
     pub(crate) const INTERFACE: u32 = 1;
     /// What old programs wrote instead of [`PACKET`]; its flags are the same.
     pub(crate) const OBSOLETE_PACKET: u32 = 2;
@@ -20,6 +21,7 @@ pub(super) const BYTE_ORDER: u32 = 0x1A2B_3C4D;
 /// Codes of options.
 pub(super) mod option {
     pub(crate) const END: u16 = 0;
+    pub(crate) const COMMENT: u16 = 1;
     pub(crate) const USER_APPLICATION: u16 = 4;
     pub(crate) const INTERFACE_NAME: u16 = 2;
     pub(crate) const INTERFACE_DESCRIPTION: u16 = 3;

@@ -28,7 +28,7 @@ pub(crate) use classic::is_capture;
 pub(crate) use format::{Direction, link_type, protocol_of};
 pub(crate) use read::{LATEST_US, Packet, Reader};
 #[cfg(not(target_family = "wasm"))]
-pub(crate) use recording::{Recording, Rotation, Stamp};
+pub(crate) use recording::{MOST_IN_MEMORY, Recording, Rotation, Stamp};
 pub(crate) use write::Writer;
 
 #[cfg(test)]

@@ -36,6 +36,8 @@ pub(crate) struct Interface {
     pub(crate) link_type: u16,
     /// As text, however it was written; the beginning of a very long one.
     pub(crate) name: Option<String>,
+    /// Speed, bit/s; 0 if it is not known.
+    pub(crate) baud: u32,
     /// Number of interfaces before it in the section that have its name and link type.
     pub(crate) twin: usize,
     /// Packets are cut at this length; 0 is none.
@@ -150,6 +152,8 @@ pub(crate) struct Reader<R> {
     /// Number of interfaces in the sections before.
     interfaces_before: usize,
     section: u64,
+    /// The text for people in the header of the section.
+    comment: Option<String>,
     is_cut_off: bool,
 }
 
@@ -167,8 +171,14 @@ impl<R: Read> Reader<R> {
             interfaces: Vec::new(),
             interfaces_before: 0,
             section: 0,
+            comment: None,
             is_cut_off: false,
         }
+    }
+
+    /// The text for people of the section that was read last.
+    pub(crate) fn comment(&self) -> Option<&str> {
+        self.comment.as_deref()
     }
 
     /// The next packet; `None` at the end. After a problem there is nothing more to read.
@@ -209,6 +219,14 @@ impl<R: Read> Reader<R> {
             }
             let body = from + 8..from + if is_whole { held - 4 } else { held };
             match kind {
+                block::SECTION if is_whole => {
+                    let options = self.buffer.get(body).and_then(|body| body.get(16..));
+                    let comment = self
+                        .options(options.unwrap_or_default())
+                        .find(|(code, _)| *code == option::COMMENT)
+                        .map(|(_, text)| String::from_utf8_lossy(text).into_owned());
+                    self.comment = comment;
+                }
                 block::INTERFACE if is_whole => {
                     if self.interfaces.len() == MOST_INTERFACES {
                         return Err(invalid("its section has more than 1024 interfaces"));
@@ -254,7 +272,8 @@ impl<R: Read> Reader<R> {
         let (longest_packet, link_type) = (self.peek(16).unwrap_or(0), self.peek(20).unwrap_or(0));
         let (name, unit) = (None, Unit(classic.unit));
         let link_type = link_type as u16;
-        let interface = Interface { link_type, name, twin: 0, longest_packet, unit, offset_s: 0 };
+        let interface =
+            Interface { link_type, name, baud: 0, twin: 0, longest_packet, unit, offset_s: 0 };
         self.interfaces.push(interface);
         self.section = 1;
         self.skip(24);
@@ -345,6 +364,7 @@ impl<R: Read> Reader<R> {
         let mut interface = Interface {
             link_type,
             name: None,
+            baud: 0,
             twin: 0,
             longest_packet,
             unit: Unit(6),
@@ -356,14 +376,13 @@ impl<R: Read> Reader<R> {
                     let name = name.get(..LONGEST_NAME).unwrap_or(name);
                     interface.name = Some(String::from_utf8_lossy(name).into_owned());
                 }
+                (option::SPEED, value) => {
+                    let baud = self.u64(value).and_then(|baud| baud.try_into().ok());
+                    interface.baud = baud.unwrap_or(0);
+                }
                 (option::TIME_UNIT, &[unit]) => interface.unit = Unit(unit),
                 (option::TIME_OFFSET, value) => {
-                    let (high, low) = match self.is_big_endian {
-                        true => (value.get(..4), value.get(4..)),
-                        false => (value.get(4..), value.get(..4)),
-                    };
-                    let (high, low) = (self.u32(high?)?, self.u32(low?)?);
-                    interface.offset_s = (u64::from(high) << 32 | u64::from(low)) as i64;
+                    interface.offset_s = self.u64(value)? as i64;
                 }
                 _ => {}
             }
@@ -434,6 +453,12 @@ impl<R: Read> Reader<R> {
     fn u32(&self, bytes: &[u8]) -> Option<u32> {
         let bytes = bytes.try_into().ok()?;
         Some(if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+
+    fn u64(&self, bytes: &[u8]) -> Option<u64> {
+        let (first, second) = bytes.split_at_checked(4)?;
+        let (high, low) = if self.is_big_endian { (first, second) } else { (second, first) };
+        Some(u64::from(self.u32(high)?) << 32 | u64::from(self.u32(low)?))
     }
 
     /// The number at this place of the unread bytes.

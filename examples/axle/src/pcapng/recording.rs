@@ -70,19 +70,27 @@ impl Stamp {
     }
 }
 
-/// A file, or a pipe with a reader.
+/// A file, a pipe with a reader, or memory.
 enum Output {
     File(File),
     /// A named pipe.
     Pipe(File),
     Stdout(io::Stdout),
+    Memory(Vec<u8>),
 }
+
+/// What a recording in memory may have, bytes.
+pub(crate) const MOST_IN_MEMORY: usize = 128 << 20;
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Self::File(file) | Self::Pipe(file) => file.write(bytes),
             Self::Stdout(stdout) => stdout.write(bytes),
+            Self::Memory(memory) if memory.len() + bytes.len() > MOST_IN_MEMORY => {
+                Err(io::Error::other("128 MB is the most that memory holds"))
+            }
+            Self::Memory(memory) => memory.write(bytes),
         }
     }
 
@@ -90,6 +98,7 @@ impl Write for Output {
         match self {
             Self::File(file) | Self::Pipe(file) => file.flush(),
             Self::Stdout(stdout) => stdout.flush(),
+            Self::Memory(_) => Ok(()),
         }
     }
 }
@@ -149,6 +158,17 @@ impl Recording {
         Self::begin(Output::Pipe(pipe), path, protocol, port, baud).map_err(Failure::Write)
     }
 
+    /// Writes to memory.
+    pub(crate) fn to_memory(protocol: Protocol, port: &str, baud: u32) -> Result<Self, Failure> {
+        let memory = Output::Memory(Vec::new());
+        Self::begin(memory, Path::new("memory"), protocol, port, baud).map_err(Failure::Write)
+    }
+
+    /// What is in memory.
+    pub(crate) fn into_memory(self) -> Vec<u8> {
+        if let Output::Memory(memory) = self.output { memory } else { Vec::new() }
+    }
+
     fn begin(
         output: Output,
         path: &Path,
@@ -158,7 +178,7 @@ impl Recording {
     ) -> io::Result<Self> {
         let keeper = match &output {
             Output::File(file) => Keeper::new(file, path)?,
-            Output::Pipe(_) | Output::Stdout(_) => None,
+            Output::Pipe(_) | Output::Stdout(_) | Output::Memory(_) => None,
         };
         let mut recording = Self {
             writer: Writer::new(protocol, port, baud),
@@ -180,6 +200,11 @@ impl Recording {
     #[cfg(all(test, unix))]
     pub(super) fn to_file(file: File) -> Self {
         Self::begin(Output::File(file), Path::new("file"), Protocol::Ucp, "port", 1).unwrap()
+    }
+
+    /// The protocol of its line.
+    pub(crate) const fn protocol(&self) -> Protocol {
+        self.line.0
     }
 
     /// The file that is written now.
@@ -285,7 +310,7 @@ impl Recording {
             Output::File(_) => Failure::Failed(format!(
                 "cannot write {path:?}: {error}; the {packets} packets in it are complete"
             )),
-            Output::Pipe(_) | Output::Stdout(_) => Failure::Write(error),
+            Output::Pipe(_) | Output::Stdout(_) | Output::Memory(_) => Failure::Write(error),
         };
         self.failure.get_or_insert(failure);
     }

@@ -4,7 +4,7 @@ use super::format::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
 use crate::args::Protocol;
 
 /// Writes blocks into memory.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Writer {
     /// Those that the caller has not taken yet.
     pub(crate) blocks: Vec<u8>,
@@ -15,19 +15,28 @@ pub(crate) struct Writer {
 impl Writer {
     /// Starts a capture with one interface, this line.
     pub(crate) fn new(protocol: Protocol, port: &str, baud: u32) -> Self {
-        let mut writer = Self { blocks: Vec::new(), interfaces: 0 };
+        let mut writer = Self::with_comment("");
+        writer.interface(protocol, port, baud);
+        writer
+    }
+
+    /// Starts a capture that has no interface yet, with a text for people.
+    pub(crate) fn with_comment(comment: &str) -> Self {
+        let mut writer = Self::default();
         writer.write(u32::from_le_bytes(MAGIC), |body| {
             body.extend(BYTE_ORDER.to_le_bytes());
             body.extend([1, 0, 0, 0]); // version 1.0
             body.extend((-1_i64).to_le_bytes()); // length of the section: unknown
             put_option(body, option::USER_APPLICATION, b"axle");
+            if !comment.is_empty() {
+                put_option(body, option::COMMENT, comment.as_bytes());
+            }
             put_option(body, option::END, &[]);
         });
-        writer.interface(protocol, port, baud);
         writer
     }
 
-    /// Continues with another line, as a new interface.
+    /// Continues with another line, as a new interface. A speed of 0 is not known.
     pub(crate) fn interface(&mut self, protocol: Protocol, port: &str, baud: u32) {
         self.write(block::INTERFACE, |body| {
             body.extend(link_type(protocol).to_le_bytes());
@@ -35,7 +44,9 @@ impl Writer {
             body.extend(0_u32.to_le_bytes()); // packets of any length
             put_option(body, option::INTERFACE_NAME, port.as_bytes());
             put_option(body, option::INTERFACE_DESCRIPTION, protocol.name().as_bytes());
-            put_option(body, option::SPEED, &u64::from(baud).to_le_bytes());
+            if baud > 0 {
+                put_option(body, option::SPEED, &u64::from(baud).to_le_bytes());
+            }
             put_option(body, option::TIME_UNIT, &[6]); // 10^-6 s
             put_option(body, option::END, &[]);
         });
@@ -44,7 +55,17 @@ impl Writer {
 
     /// Appends bytes that were complete at this time, microseconds since 1970.
     pub(crate) fn packet(&mut self, micros: u64, direction: Option<Direction>, bytes: &[u8]) {
-        let interface = self.interfaces.saturating_sub(1);
+        self.packet_of(self.interfaces.saturating_sub(1), micros, direction, bytes);
+    }
+
+    /// The same on the line with this number.
+    pub(crate) fn packet_of(
+        &mut self,
+        interface: u32,
+        micros: u64,
+        direction: Option<Direction>,
+        bytes: &[u8],
+    ) {
         self.write(block::PACKET, |body| {
             body.extend(interface.to_le_bytes());
             body.extend(((micros >> 32) as u32).to_le_bytes());

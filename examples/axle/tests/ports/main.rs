@@ -5,6 +5,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod bugreport;
 mod drive;
 mod extcap;
 mod faults;
