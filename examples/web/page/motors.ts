@@ -131,8 +131,11 @@ class MotorCard {
     const real = truth?.nodes?.find(({ id }) => id === node.id);
     if (real) {
       this.disc?.turnTo(real.turns);
-      const position = node.mode === "position" ? `${real.turns.toFixed(2)} turns, ` : "";
-      say(this.really, `${position}${real.rps.toFixed(2)} turns/s`);
+      const isSpeed = node.mode !== "position";
+      say(
+        this.really,
+        isSpeed ? `${real.rps.toFixed(2)} turns/s` : `${real.turns.toFixed(2)} turns`,
+      );
     }
     say(this.reported, report(node));
     say(this.health, HEALTH_WORDS[node.health] ?? node.health);
