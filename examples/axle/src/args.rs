@@ -182,12 +182,14 @@ pub(crate) fn time_within(text: &str, least: f64, most: f64) -> Result<Duration,
 }
 
 /// A probability.
+#[cfg(unix)]
 pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err("it is not within 0..=1".to_owned()) }
 }
 
 /// A byte in two hex digits, with or without 0x.
+#[cfg(unix)]
 pub(crate) fn hex_byte(text: &str) -> Result<u8, String> {
     let digits = text.strip_prefix("0x").unwrap_or(text);
     let is_hex = digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());

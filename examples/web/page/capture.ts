@@ -74,7 +74,9 @@ async function open(module: WebAssembly.Module, file: File): Promise<void> {
     show(opened, true);
     await showContents(mine, contents);
   } catch (error) {
-    if (capture === mine) say(words, `${file.name}: ${message(error)}`);
+    // The tool's sentence; here the option is a choice.
+    const why = message(error).replace(/use --protocol/, "choose the protocol");
+    if (capture === mine) say(words, `${file.name}: ${why}`);
   } finally {
     if (capture === mine) idle();
   }
@@ -190,6 +192,8 @@ async function rawBytes(
 async function save(kind: "csv" | "jsonl"): Promise<void> {
   if (!capture || !contents) return;
   const mine = capture;
+  const both = [button("export-csv"), button("export-json")];
+  for (const it of both) it.disabled = true;
   const name = mine.file.name.replace(/\.(gz|pcapng|pcap|bin)$/g, "");
   const table = select("export-table").value;
   try {
@@ -207,6 +211,7 @@ async function save(kind: "csv" | "jsonl"): Promise<void> {
     if (capture === mine) say(words, message(error));
   } finally {
     if (capture === mine) idle();
+    for (const it of both) it.disabled = false;
   }
 }
 

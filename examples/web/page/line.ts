@@ -11,6 +11,7 @@ import {
   input,
   make,
   message,
+  numberIn,
   say,
   select,
   show,
@@ -26,6 +27,8 @@ import { type Bus, guess, Listener } from "./wasm.ts";
 const BAUD = { ucp: 115_200, ikeya: 500_000 };
 const LISTEN_MS = 1000;
 const WATCH_MS = 100;
+/** The second click of a double click comes sooner. */
+const CLOSE_AGAIN_MS = 1000;
 const LINES_SEEN = 100;
 /**
  * Pieces of a recording are joined when they are so many, so that the browser may keep them on
@@ -36,6 +39,7 @@ const PIECES = 256;
 const places = { cards: the("line-cards", HTMLElement), refused: the("line-refused", HTMLElement) };
 const words = the("line-words", HTMLElement);
 const alarm = the("line-alarm", HTMLElement);
+const owedAlarm = the("line-owed", HTMLElement);
 const arm = button("line-arm");
 const armWords = the("line-arm-words", HTMLElement);
 const watched = the("watch-lines", HTMLElement);
@@ -53,8 +57,8 @@ let watch: Watch | undefined;
 /** What was watched, as pcapng; it is there until the port is used again. */
 let recording: Blob[] = [];
 let isBusy = false;
-/** The port is closed as soon as everything is seen at standstill. */
-let isClosing = false;
+/** The port is closed as soon as everything is seen at standstill; it was asked for at this time. */
+let closingSince: number | undefined;
 /**
  * What may have been moving when a line was lost or closed, and was not seen at standstill since:
  * the next session begins with a stop. A rover has the id 0.
@@ -64,7 +68,13 @@ const owed: Record<Kind, Set<number>> = { bus: new Set(), rover: new Set() };
 const protocol = (): "ucp" | "ikeya" | "ikeya-3" =>
   select("line-protocol").value as "ucp" | "ikeya" | "ikeya-3";
 const kind = (): Kind => (protocol() === "ucp" ? "rover" : "bus");
-const baud = (): number => input("line-baud").valueAsNumber;
+
+function baud(): number {
+  const value = numberIn(input("line-baud"), 1200, 4_000_000, true);
+  if (value === undefined) throw new Error("Baud: a whole number from 1200 to 4000000, please.");
+  return value;
+}
+
 const pause = (ms: number) => new Promise((resolve) => setTimeout(resolve, ms));
 
 function warn(text: string): void {
@@ -204,7 +214,7 @@ function connect(): Promise<void> {
   return busy(async () => {
     const transport = await SerialTransport.open(port as SerialPort, baud());
     clear();
-    isClosing = false;
+    closingSince = undefined;
     machineKind = kind();
     const story = new Story(the("line-story", HTMLElement));
     const deadMan = Number(select("line-dead-man").value) * 1000;
@@ -234,9 +244,9 @@ function lost(reason: string): void {
     void machine.session.close();
   }
   machine = undefined;
-  isClosing = false;
+  closingSince = undefined;
   warn(
-    isAtRisk || owed[machineKind].size > 0
+    isAtRisk || isSomethingOwed()
       ? `${reason} The motors may still be moving: this page can no longer stop them. Cut their power if they move.`
       : `${reason} Nothing was moving by an order from here.`,
   );
@@ -247,6 +257,33 @@ function lost(reason: string): void {
 /** Remembers what may be moving, for the next session. */
 function owe(machine: MovingMachine): void {
   for (const id of machine.mayMove()) owed[machineKind].add(id);
+  keepOwed();
+}
+
+const isSomethingOwed = (): boolean => Object.values(owed).some((ids) => ids.size > 0);
+
+/** For this tab, in case that it is loaded again. */
+function keepOwed(): void {
+  sessionStorage.setItem("owed", JSON.stringify({ bus: [...owed.bus], rover: [...owed.rover] }));
+}
+
+function takeUpOwed(): void {
+  const kept = JSON.parse(sessionStorage.getItem("owed") ?? "{}") as Partial<
+    Record<Kind, number[]>
+  >;
+  for (const kind of ["bus", "rover"] as const)
+    for (const id of kept[kind] ?? []) owed[kind].add(id);
+}
+
+/** What no session that is open now can stop. */
+function owedWords(): string {
+  const isServed = (kind: Kind) => machine !== undefined && machineKind === kind;
+  const motors = isServed("bus") ? [] : [...owed.bus].sort((a, b) => a - b);
+  const names = motors.length > 0 ? [`Motor ${motors.join(", ")}`] : [];
+  if (!isServed("rover") && owed.rover.size > 0) names.push("The rover");
+  return names.length > 0
+    ? `${names.join(" and ")} may still be moving: an earlier session has not seen standstill. Connect again, or cut the power.`
+    : "";
 }
 
 /** Removes what an earlier line has left on the screen. */
@@ -257,11 +294,13 @@ function clear(): void {
   recording = [];
 }
 
-/** Stops first; asked for again, it closes whatever still moves. */
+/** Stops first; asked for again, not by a double click, it closes whatever still moves. */
 async function close(): Promise<void> {
-  if (machine?.isArmed) {
-    isClosing = true;
-    machine.disarm("Closing: all motors are told to stop.");
+  const now = performance.now();
+  if (closingSince !== undefined && now < closingSince + CLOSE_AGAIN_MS) return;
+  if (closingSince === undefined && machine && (machine.isArmed || machine.isStopPending)) {
+    closingSince = now;
+    if (machine.isArmed) machine.disarm("Closing: all motors are told to stop.");
     say(words, "The port is closed as soon as everything is seen at standstill.");
     return;
   }
@@ -272,7 +311,7 @@ async function close(): Promise<void> {
 }
 
 async function end(): Promise<void> {
-  isClosing = false;
+  closingSince = undefined;
   if (machine) {
     unguard(machine);
     owe(machine);
@@ -295,7 +334,7 @@ async function end(): Promise<void> {
 function setArmed(isArmed: boolean): void {
   if (!machine) return;
   if (isArmed) {
-    isClosing = false;
+    closingSince = undefined;
     machine.isArmed = true;
     machine.story.tell("Armed by hand.");
   } else {
@@ -307,9 +346,13 @@ function setArmed(isArmed: boolean): void {
 export function draw(): void {
   const isArmed = machine?.isArmed ?? false;
   if (machine) machine.show();
+  const wasOwed = isSomethingOwed();
   for (const id of machine?.standsStill() ?? []) owed[machineKind].delete(id);
+  if (wasOwed) keepOwed();
+  say(owedAlarm, owedWords());
+  show(owedAlarm, owedAlarm.textContent !== "");
   const isPending = machine?.isStopPending ?? false;
-  if (isClosing && machine && !isPending) void end();
+  if (closingSince !== undefined && machine && !isPending) void end();
   arm.setAttribute("aria-checked", String(isArmed));
   say(
     armWords,
@@ -323,15 +366,17 @@ export function draw(): void {
   );
   say(
     button("line-close"),
-    isPending
+    isPending && closingSince !== undefined
       ? "Close although a stop is pending"
-      : isArmed
+      : isPending || isArmed
         ? "Stop, and close the port"
         : "Close the port",
   );
 }
 
 export function start(): void {
+  takeUpOwed();
+  addEventListener("pagehide", () => machine && owe(machine));
   show(the("line-none", HTMLElement), serial === undefined);
   show(the("line-port", HTMLElement), serial !== undefined);
   button("line-choose").addEventListener("click", () => void choose());

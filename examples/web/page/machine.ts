@@ -68,9 +68,9 @@ export class MovingMachine implements Machine {
     this.isArmed = isSimulated;
   }
 
-  /** As of the last picture. */
+  /** As of now: a decision must not rest on an old picture, and a hidden page draws none. */
   get isStopPending(): boolean {
-    return this.picture.isPending;
+    return this.look().isPending;
   }
 
   static bus(
@@ -143,7 +143,7 @@ export class MovingMachine implements Machine {
   /** Draws what is so now. */
   show(): void {
     if (this.session.closedBecause !== undefined) return;
-    this.picture = this.draw();
+    this.look();
     const events = this.session.events();
     this.story.add(events);
     if (this.isArmed && !this.isSimulated && events.some(({ event }) => event === "dead_man"))
@@ -152,12 +152,7 @@ export class MovingMachine implements Machine {
 
   /** What may be moving now, also when the line is gone. */
   mayMove(): number[] {
-    try {
-      this.picture = this.draw();
-    } catch {
-      // The page has failed: the last picture is what is known.
-    }
-    return this.picture.mayMove;
+    return this.look().mayMove;
   }
 
   /** What was seen at standstill behind a stop. */
@@ -165,10 +160,19 @@ export class MovingMachine implements Machine {
     return this.picture.standsStill;
   }
 
-  /** Stops what an earlier session could not, whether or not it was heard yet. */
+  /** Stops what an earlier session could not, whether or not it was heard yet, and nothing else. */
   stopWhatIsOwed(ids: Iterable<number>): void {
-    this.disarm("When the last session ended, something may have moved: stop.");
+    this.story.tell("An earlier session has not seen it at standstill: stop.");
     for (const id of ids) this.stopOne(id);
+  }
+
+  private look(): Picture {
+    try {
+      this.picture = this.draw();
+    } catch {
+      // The page has failed, or the session is over: the last picture is what is known.
+    }
+    return this.picture;
   }
 
   stop(): void {

@@ -185,8 +185,10 @@ export const pendingStops = (state: BusState): BusNode[] =>
 /** What a page that was lost, or somebody else, has set moving. */
 const movingWithoutOrder = (state: BusState): number[] =>
   state.nodes
-    .filter(({ velocity, target }) => target === null && Math.abs(velocity ?? 0) >= STANDS_RPS)
-    .filter(({ stop }) => stop === "not_asked" || stop === "standing_still")
+    .filter(({ velocity }) => Math.abs(velocity ?? 0) >= STANDS_RPS)
+    .filter(
+      ({ stop, target }) => stop === "standing_still" || (stop === "not_asked" && target === null),
+    )
     .map(({ id }) => id);
 
 /** How far the stop of a bus has come, the worst first. */
@@ -206,12 +208,11 @@ export function busStopWords(state: BusState): string {
   return parts.length > 0 ? parts.join(" ") : "No stop is in progress.";
 }
 
-/** What may be moving by an order from here, or without one. */
+/** What may be moving by an order from here: a motor that stands still behind a stop may not. */
 export const mayMove = (state: BusState): number[] =>
   state.nodes
-    .filter(({ stop, target }) => isPending(stop) || target !== null)
-    .map(({ id }) => id)
-    .concat(movingWithoutOrder(state));
+    .filter(({ stop, target }) => isPending(stop) || (stop === "not_asked" && target !== null))
+    .map(({ id }) => id);
 
 /** Something may move although it was told to stop, or without an order from here. */
 export const isBusAlarming = (state: BusState): boolean =>

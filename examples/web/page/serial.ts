@@ -84,7 +84,8 @@ export class SerialTransport implements Transport {
       try {
         for (;;) {
           const { value, done } = await this.reader.read();
-          if (done) break;
+          // A port that is there ends by an error, and one that is closed says so.
+          if (done) return this.lost("The adapter has ended.");
           this.onbytes(value);
         }
       } catch {

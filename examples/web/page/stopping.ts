@@ -53,6 +53,8 @@ function stopAll(): void {
  */
 function key(event: KeyboardEvent): void {
   if (machines.size === 0) return;
+  // A key that is held down gives no second order: a stop may have come between.
+  if (event.key === "Enter" && event.repeat) return event.preventDefault();
   const isDown = event.type === "keydown" && !event.repeat;
   const isBox = event.target instanceof HTMLInputElement && event.target.type === "checkbox";
   if (event.key !== " " && !(event.key === "Enter" && isBox)) return;
@@ -62,6 +64,13 @@ function key(event: KeyboardEvent): void {
   else if (isDown) (event.target as HTMLInputElement).click();
 }
 
+/** An open list takes the keys, also the space bar: while motors may move, none is opened. */
+function keepListsClosed(event: Event): void {
+  const isAtRisk = [...machines].some((machine) => machine.isAtRisk());
+  const opens = !(event instanceof KeyboardEvent) || !["Tab", "Shift"].includes(event.key);
+  if (event.target instanceof HTMLSelectElement && isAtRisk && opens) event.preventDefault();
+}
+
 function personIsThere(): void {
   for (const machine of machines) machine.keepAlive();
 }
@@ -69,6 +78,8 @@ function personIsThere(): void {
 export function start(): void {
   for (const type of ["pointerdown", "click"]) button("stop").addEventListener(type, stopAll);
   for (const type of ["keydown", "keyup"] as const) addEventListener(type, key, { capture: true });
+  for (const type of ["mousedown", "keydown"])
+    addEventListener(type, keepListsClosed, { capture: true });
   for (const type of ["pointerdown", "pointermove", "keydown", "wheel", "touchmove"]) {
     addEventListener(type, personIsThere, { capture: true, passive: true });
   }

@@ -23,7 +23,14 @@ const places = { cards: the("try-cards", HTMLElement), refused: the("try-refused
 const hint = the("try-hint", HTMLElement);
 
 let simulation:
-  | { machine: MovingMachine; transport: SimulatedTransport; kind: Kind; isRunaway: boolean }
+  | {
+      machine: MovingMachine;
+      transport: SimulatedTransport;
+      kind: Kind;
+      isRunaway: boolean;
+      /** In the last picture. */
+      wasStopPending: boolean;
+    }
   | undefined;
 
 const kind = (): Kind => (settings().get("on") === "rover" ? "rover" : "bus");
@@ -50,7 +57,7 @@ function begin(module: WebAssembly.Module, kind: Kind): void {
       : MovingMachine.rover(transport, DEAD_MAN_MS, places, story, picture);
   machine.session.onclosed = (reason) => say(hint, reason);
   if (kind === "bus") machine.session.order((role, now) => (role as Bus).discover(now));
-  simulation = { machine, transport, kind, isRunaway: false };
+  simulation = { machine, transport, kind, isRunaway: false, wasStopPending: false };
   input("try-noise").value = "0";
   input("try-cable").checked = false;
   showNoise();
@@ -70,11 +77,12 @@ export function draw(): void {
   if (!simulation) return;
   if (!simulation.isRunaway) runAway();
   const { machine } = simulation;
-  const wasPending = machine.isStopPending;
   machine.show();
+  const [wasPending, isPending] = [simulation.wasStopPending, machine.isStopPending];
+  simulation.wasStopPending = isPending;
   if (
     machine.session.closedBecause !== undefined ||
-    machine.isStopPending === wasPending ||
+    isPending === wasPending ||
     !simulation.isRunaway
   )
     return;
@@ -114,6 +122,7 @@ function runAway(): void {
       );
     }
     simulation.isRunaway = true;
+    simulation.wasStopPending = machine.isStopPending;
   } catch {
     // It is not ready yet: the next picture tries again.
   }

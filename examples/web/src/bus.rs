@@ -170,16 +170,19 @@ impl Bus {
                 self.session.role.stop(node, instant(now));
             }
         }
-        if self.is_search_due && self.is_quiet() && !self.session.role.is_discovering() {
+        if self.is_search_due && self.is_settled() && !self.session.role.is_discovering() {
             self.is_search_due = false;
             self.session.role.discover(instant(now));
         }
     }
 
-    /// Whether every stop that was asked for is seen to be obeyed.
-    fn is_quiet(&self) -> bool {
+    /// Whether each node that answers is seen to obey its stop: one that does not must not keep the
+    /// others from being searched for.
+    fn is_settled(&self) -> bool {
         let role = &self.session.role;
-        role.stops_owed().is_empty() && role.coasting().is_empty()
+        let is_stopping = |node| role.stops_owed().contains(node) || role.coasting().contains(node);
+        let is_lost = |node| matches!(role.health(node), None | Some(Health::Abnormal));
+        NodeId::ALL.into_iter().all(|node| !is_stopping(node) || is_lost(node))
     }
 
     fn node(&self, node: NodeId, now: f64) -> Value {

@@ -490,6 +490,10 @@ async function scanned(simulator) {
   const page = await open("#line", { serial: simulator });
   await page.locator("#line-choose").click();
   await says(page.locator("#line-words"), "0403:6001");
+  await page.locator("#line-baud").fill("-5");
+  await page.locator("#line-connect").click();
+  await says(page.locator("#line-alarm"), "a whole number from 1200");
+  await page.locator("#line-baud").fill("500000");
   await page.locator("#line-connect").click();
   await says(page.locator("#line-cards"), "Motor 1", 10_000);
   return page;
@@ -579,6 +583,8 @@ async function aStopStaysOwedUntilStandstillIsSeen() {
   await page.locator("#line-connect").click();
   await says(page.locator("#stop-words"), "Motor 1 (stop): sent, no answer yet");
   await page.locator("#line-close").click();
+  await wait(1000);
+  await page.locator("#line-close").click();
   await says(page.locator("#line-alarm"), "a motor may be moving");
   simulator.unplug(1, false);
   await page.locator("#line-connect").click();
@@ -621,19 +627,23 @@ async function aDisarmedRoverTakesNoOrder() {
   await close(page);
 }
 
-/** A motor that somebody else has set moving is said to move; one that comes later is stopped. */
-async function aMotorThatNobodyHereHasMoved() {
-  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+function otherMasterTurns(simulator, node) {
   const other = new wasm.Bus(500_000, 60_000, performance.now());
   other.discover(performance.now());
-  for (let isAsked = false; turns(simulator) < 0.9;) {
+  for (let isAsked = false; JSON.parse(simulator.state()).nodes[node - 1].rps < 0.9;) {
     const now = performance.now();
     for (let frame; (frame = other.transmit(now));) simulator.write(frame, now);
     other.receive(simulator.read(now), now);
-    if (isAsked || JSON.parse(other.state(now)).nodes[0].mode === null) continue;
-    other.set_velocity(1, 1, now);
+    if (isAsked || JSON.parse(other.state(now)).nodes[node - 1].mode === null) continue;
+    other.set_velocity(node, 1, now);
     isAsked = true;
   }
+}
+
+/** A motor that somebody else has set moving is said to move; one that comes later is stopped. */
+async function aMotorThatNobodyHereHasMoved() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  otherMasterTurns(simulator, 1);
   const page = await scanned(simulator);
   await says(page.locator("#stop-words"), "Motor 1 MOVES without an order from here");
   await page.keyboard.press("Space");
@@ -658,11 +668,75 @@ async function closingStopsFirst() {
   await page.locator("#line-connect").click();
   await says(page.locator("#line-cards"), "Motor 1", 10_000);
   await run();
+  await closing.dblclick();
+  await says(page.locator("#line-words"), "The port is closed.");
+  assert.ok(Math.abs(turns(simulator)) < 0.1, "a double click waits, too");
+  await page.locator("#line-connect").click();
+  await says(page.locator("#line-cards"), "Motor 1", 10_000);
+  await run();
   simulator.unplug(1, true);
   await closing.click();
   await says(closing, "Close although a stop is pending");
+  await wait(1000);
   await closing.click();
   await says(page.locator("#line-alarm"), "a motor may be moving");
+  await says(page.locator("#line-owed"), "Motor 1 may still be moving");
+  await page.reload();
+  await says(page.locator("#line-owed"), "Motor 1 may still be moving");
+  simulator.unplug(1, false);
+  await page.locator("#line-choose").click();
+  await page.locator("#line-connect").click();
+  await says(card(page, "Motor 1"), "seen at standstill");
+  await page.locator("#line-owed").waitFor({ state: "hidden" });
+  await close(page);
+}
+
+/** Neither on connecting again nor by a stop that another motor is owed. */
+async function whatOthersMoveIsLeftAlone() {
+  const simulator = wasm.Simulator.bus("1:velocity 2:velocity", 1, performance.now());
+  otherMasterTurns(simulator, 2);
+  const page = await scanned(simulator);
+  const reconnect = async () => {
+    await page.locator("#line-close").click();
+    await wait(1000);
+    if ((await text(page, "#line-close")) === "Close although a stop is pending")
+      await page.locator("#line-close").click();
+    await says(page.locator("#line-words"), "The port is closed");
+    await page.locator("#line-connect").click();
+  };
+  await says(page.locator("#stop-words"), "Motor 2 MOVES without an order from here");
+  await reconnect();
+  await says(page.locator("#stop-words"), "Motor 2 MOVES without an order from here");
+  await page.locator("#line-arm").click();
+  await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
+  await until(() => turns(simulator) > 0.9, "motor 1 runs");
+  await page.pull();
+  await says(page.locator("#line-alarm"), "may still be moving");
+  await page.evaluate(() => void window.plugIn());
+  await page.locator("#line-choose").click();
+  await page.locator("#line-connect").click();
+  await says(card(page, "Motor 1"), "seen at standstill");
+  assert.ok(JSON.parse(simulator.state()).nodes[1].rps > 0.9, "motor 2 runs on");
+  await close(page);
+}
+
+/** While motors may move, no list opens, which would take the space bar. */
+async function keysThatMustNotBeTaken() {
+  const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
+  const page = await scanned(simulator);
+  await page.locator("#line-arm").click();
+  await page.locator("#to-capture").click();
+  await page.locator("#capture-protocol").focus();
+  await page.keyboard.press("ArrowDown");
+  assert.equal(await page.locator("#capture-protocol").inputValue(), "auto");
+  await page.locator("#to-line").click();
+  const run = card(page, "Motor 1").getByRole("button", { name: "Run" });
+  await run.focus();
+  await page.keyboard.down("Enter");
+  await until(() => turns(simulator) > 0.9, "the motor runs");
+  await page.keyboard.press("Space");
+  for (let repeated = 0; repeated < 10; repeated += 1) await page.keyboard.down("Enter");
+  await says(card(page, "Motor 1"), "seen at standstill");
   await close(page);
 }
 
@@ -892,6 +966,8 @@ const stories = [
   aDisarmedRoverTakesNoOrder,
   aMotorThatNobodyHereHasMoved,
   closingStopsFirst,
+  whatOthersMoveIsLeftAlone,
+  keysThatMustNotBeTaken,
   theDeadManDisarms,
   aHiddenPageStops,
   aClosedPageStopsAndWarns,

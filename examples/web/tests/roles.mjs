@@ -128,6 +128,33 @@ for (let phase = 0; phase < 40; phase += 1) {
   assert.ok(Math.abs(JSON.parse(simulator.state()).nodes[1].rps) < 0.05);
 }
 
+// Also while another one, which is owed its stop, is missing.
+{
+  const simulator = Simulator.bus("1:velocity 2:velocity", 1, 0);
+  const other = new Bus(500_000, 600_000, 0);
+  other.discover(0);
+  let now = serve(other, simulator, 0, 2000);
+  other.set_velocity(2, 1, now);
+  now = serve(other, simulator, now, 2000);
+  simulator.unplug(2, true);
+  const bus = new Bus(500_000, 600_000, now);
+  bus.discover(now);
+  now = serve(bus, simulator, now, 3000);
+  bus.set_velocity(1, 1, now);
+  now = serve(bus, simulator, now, 1000);
+  simulator.unplug(1, true);
+  simulator.unplug(2, false);
+  now = serve(bus, simulator, now, 500);
+  bus.stop_all(now);
+  now = serve(bus, simulator, now, 5000);
+  assert.equal(state(bus, now).nodes[0].stop, "owed");
+  assert.equal(state(bus, now).nodes[1].stop, "standing_still");
+  assert.ok(Math.abs(JSON.parse(simulator.state()).nodes[1].rps) < 0.05);
+  simulator.unplug(1, false);
+  now = serve(bus, simulator, now, 2000);
+  assert.equal(state(bus, now).nodes[0].stop, "standing_still");
+}
+
 {
   const simulator = Simulator.bus("1:velocity 8:velocity", 1, 0);
   const other = new Bus(500_000, 600_000, 0);
