@@ -10,7 +10,8 @@ use std::{path::Path, process::Command, sync::Once};
 pub(crate) fn axle(args: &[&str]) -> Command {
     static BUILT: Once = Once::new();
     BUILT.call_once(|| {
-        let build = Command::new(env!("CARGO")).args(["build", "--quiet", "-p", "axlewire-cli"]).status();
+        let build =
+            Command::new(env!("CARGO")).args(["build", "--quiet", "-p", "axlewire-cli"]).status();
         assert!(build.unwrap().success());
     });
     let mut command = Command::new(Path::new(env!("CARGO_BIN_EXE_spin")).with_file_name("axle"));

@@ -152,7 +152,8 @@ impl Motors {
         let is_between = is_late && bytes.starts_with(&[0xBB]) && !self.answers.is_empty();
         let is_first = is_between && !std::mem::replace(&mut self.has_cut, true);
         let until = clock::now() + Duration::from_millis(if is_first { 45 } else { 0 });
-        let due = self.answers.pop_front_if(|(at, _)| *at <= until);
+        let is_due = self.answers.front().is_some_and(|(at, _)| *at <= until);
+        let due = is_due.then(|| self.answers.pop_front()).flatten();
         due.map(|(_, answer)| answer).unwrap_or_default()
     }
 
