@@ -20,9 +20,9 @@ wasm=wasm32-unknown-unknown/release/axlewire_web.wasm
 [ "$target/$wasm" -nt "$target/cross/$wasm" ] && wasm=$target/$wasm || wasm=$target/cross/$wasm
 wasm-bindgen --target web --out-dir pkg "$wasm"
 npm ci --silent
-npx wasm-opt -Oz --enable-bulk-memory --enable-bulk-memory-opt --enable-multivalue \
+npx wasm-opt -Oz --converge --enable-bulk-memory --enable-bulk-memory-opt --enable-multivalue \
     --enable-mutable-globals --enable-nontrapping-float-to-int --enable-reference-types \
-    --enable-sign-ext --strip-debug --strip-producers pkg/axlewire_web_bg.wasm \
+    --enable-sign-ext --strip-debug --strip-producers --strip-target-features pkg/axlewire_web_bg.wasm \
     -o pkg/axlewire_web_bg.wasm
 npx tsc --noEmit
 [ "${2-}" != --site ] || export VITE_DOCS=doc/axlewire/index.html

@@ -94,11 +94,11 @@ export interface Truth {
 /** How far the stop of a motor has come, in words. */
 export const STOP_WORDS: Record<StopProgress, string> = {
   not_asked: "not asked",
-  owed: "sent, no answer yet: it may be moving",
+  owed: "sent, no answer yet: may be moving",
   confirmed: "confirmed, not yet at standstill",
   standing_still: "stopped, seen at standstill",
   still_moving: "confirmed, but STILL MOVING",
-  no_reports: "sent, but nothing is reported: it may be moving",
+  no_reports: "sent, but nothing is reported: may be moving",
 };
 
 /** A stop was asked for and the motor was not yet seen at standstill. */

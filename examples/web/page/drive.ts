@@ -150,11 +150,12 @@ function reported(value: unknown, share: number): string {
   return typeof value === "number" ? (value * share).toFixed(share === 1 ? 0 : 2) : "?";
 }
 
-export function roverStopWords(state: RoverState): string {
-  return `Rover: ${state.stop_text}.`;
-}
+export const roverAlarm = (state: RoverState): string =>
+  isStopPending(state) && (state.link === "down" || state.stop === "still_moving")
+    ? `The rover is NOT seen to stop: ${state.link === "down" ? "it is silent" : state.stop_text}.`
+    : "";
 
-export const isRoverAlarming = (state: RoverState): boolean =>
-  isStopPending(state) && (state.link === "down" || state.stop === "still_moving");
+export const roverStopWords = (state: RoverState): string =>
+  roverAlarm(state) === "" ? `Rover: ${state.stop_text}.` : "";
 
 export const isStopPending = (state: RoverState): boolean => isPending(state.stop);

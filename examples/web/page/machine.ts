@@ -6,18 +6,12 @@
 import {
   busStopWords,
   type BusSession,
-  isBusAlarming,
+  busAlarm,
   mayMove,
   Motors,
   pendingStops,
 } from "./motors.ts";
-import {
-  Drive,
-  isRoverAlarming,
-  isStopPending,
-  type RoverSession,
-  roverStopWords,
-} from "./drive.ts";
+import { Drive, roverAlarm, isStopPending, type RoverSession, roverStopWords } from "./drive.ts";
 import { isPending, type Simulation } from "./contract.ts";
 import { say, show } from "./dom.ts";
 import { Session, type Transport } from "./session.ts";
@@ -38,7 +32,7 @@ interface Picture {
   /** How far the stop has come. */
   words: string;
   isPending: boolean;
-  isAlarming: boolean;
+  alarm: string;
   /** Of motors, their ids; of a rover, 0: what may be moving, and what was stopped. */
   mayMove: number[];
   standsStill: number[];
@@ -53,7 +47,7 @@ export class MovingMachine implements Machine {
   private picture: Picture = {
     words: "",
     isPending: false,
-    isAlarming: false,
+    alarm: "",
     mayMove: [],
     standsStill: [],
   };
@@ -96,7 +90,7 @@ export class MovingMachine implements Machine {
       return {
         words: busStopWords(state),
         isPending: pendingStops(state).length > 0,
-        isAlarming: isBusAlarming(state),
+        alarm: busAlarm(state),
         mayMove: mayMove(state),
         standsStill: state.nodes
           .filter(({ stop }) => stop === "standing_still")
@@ -130,7 +124,7 @@ export class MovingMachine implements Machine {
       return {
         words: roverStopWords(state),
         isPending: isStopPending(state),
-        isAlarming: isRoverAlarming(state),
+        alarm: roverAlarm(state),
         mayMove: isPending(state.stop) || state.stop === "not_asked" ? [ROVER] : [],
         standsStill: state.stop === "standing_still" && state.link === "up" ? [ROVER] : [],
       };
@@ -199,11 +193,15 @@ export class MovingMachine implements Machine {
   }
 
   words(): string {
-    return `${this.isSimulated ? "Simulation" : "The line"}: ${this.picture.words}`;
+    return this.named(this.picture.words);
   }
 
-  isAlarming(): boolean {
-    return this.picture.isAlarming;
+  alarm(): string {
+    return this.named(this.picture.alarm);
+  }
+
+  private named(text: string): string {
+    return text && `${this.isSimulated ? "Simulation" : "The line"}: ${text}`;
   }
 }
 

@@ -191,21 +191,33 @@ const movingWithoutOrder = (state: BusState): number[] =>
     )
     .map(({ id }) => id);
 
-/** How far the stop of a bus has come, the worst first. */
-export function busStopWords(state: BusState): string {
-  const parts: string[] = [];
-  const tell = (ids: number[], what: string) =>
-    ids.length > 0 && parts.push(`Motor ${ids.join(", ")} ${what}.`);
+const motors = (ids: number[]): string => `motor${ids.length > 1 ? "s" : ""} ${ids.join(", ")}`;
+const capital = (text: string): string => text.slice(0, 1).toUpperCase() + text.slice(1);
+const isLost = ({ stop, health }: BusNode) => isPending(stop) && health === "abnormal";
+
+/** What moves, or may move, against an order or without one; nothing if that is not so. */
+export function busAlarm(state: BusState): string {
   const ids = (those: (node: BusNode) => boolean) => state.nodes.filter(those).map(({ id }) => id);
-  const isLost = ({ stop, health }: BusNode) => isPending(stop) && health === "abnormal";
-  tell(movingWithoutOrder(state), "MOVES without an order from here: press STOP");
-  tell(ids(isLost), "is NOT seen to stop: it does not answer, and may be moving");
-  for (const progress of ["still_moving", "owed", "confirmed", "standing_still"] as const)
-    tell(
-      ids((node) => node.stop === progress && !isLost(node)),
-      `(stop): ${STOP_WORDS[progress]}`,
-    );
-  return parts.length > 0 ? parts.join(" ") : "No stop is in progress.";
+  return [
+    [movingWithoutOrder(state), "MOVING without an order from here: press STOP"] as const,
+    [ids(({ stop }) => stop === "still_moving"), "STILL MOVING after a confirmed stop"] as const,
+    [ids(isLost), "NOT seen to stop: no answer, may be moving"] as const,
+  ]
+    .filter(([ids]) => ids.length > 0)
+    .map(([ids, what]) => `${capital(motors(ids))} ${ids.length > 1 ? "are" : "is"} ${what}.`)
+    .join(" ");
+}
+
+/** How far the other stops of a bus have come. */
+export function busStopWords(state: BusState): string {
+  const parts = (["owed", "confirmed", "standing_still"] as const)
+    .map((progress) => {
+      const those = state.nodes.filter((node) => node.stop === progress && !isLost(node));
+      return [those.map(({ id }) => id), STOP_WORDS[progress]] as const;
+    })
+    .filter(([ids]) => ids.length > 0)
+    .map(([ids, what]) => `Stop of ${motors(ids)}: ${what}.`);
+  return parts.length > 0 || busAlarm(state) !== "" ? parts.join(" ") : "No stop is in progress.";
 }
 
 /** What may be moving by an order from here: a motor that stands still behind a stop may not. */
@@ -213,10 +225,3 @@ export const mayMove = (state: BusState): number[] =>
   state.nodes
     .filter(({ stop, target }) => isPending(stop) || (stop === "not_asked" && target !== null))
     .map(({ id }) => id);
-
-/** Something may move although it was told to stop, or without an order from here. */
-export const isBusAlarming = (state: BusState): boolean =>
-  movingWithoutOrder(state).length > 0 ||
-  state.nodes.some(
-    ({ stop, health }) => stop === "still_moving" || (isPending(stop) && health === "abnormal"),
-  );

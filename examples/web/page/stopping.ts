@@ -15,13 +15,14 @@ export interface Machine {
   isAtRisk(): boolean;
   /** How far the stop has come, in a few words. */
   words(): string;
-  /** It may be moving against an order, or without one. */
-  isAlarming(): boolean;
+  /** What moves against an order, or without one, if anything does. */
+  alarm(): string;
 }
 
 const machines = new Set<Machine>();
 const bar = the("stop-bar", HTMLElement);
 const words = the("stop-words", HTMLElement);
+const alarm = the("stop-alarm", HTMLElement);
 
 /** From now on the stop bar is there and stops this machine. */
 export function guard(machine: Machine): void {
@@ -36,11 +37,9 @@ export function unguard(machine: Machine): void {
 
 /** Called with each picture that the page draws. */
 export function showStop(): void {
-  say(words, [...machines].map((machine) => machine.words()).join(" "));
-  words.classList.toggle(
-    "alarming",
-    [...machines].some((machine) => machine.isAlarming()),
-  );
+  const all = [...machines];
+  say(alarm, all.map((machine) => machine.alarm()).join(" "));
+  say(words, all.map((machine) => machine.words()).join(" "));
 }
 
 function stopAll(): void {

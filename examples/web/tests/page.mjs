@@ -169,7 +169,7 @@ async function stopIsSeenToStandStill() {
   await page.locator("#stop").click();
   await says(card(page, "Motor 1"), "seen at standstill");
   await says(page.locator("#try-story"), /is seen at standstill/);
-  await says(page.locator("#stop-words"), /Motor 1.*seen at standstill/);
+  await says(page.locator("#stop-words"), /Stop of motors 1, .*seen at standstill/);
   await shot(page, "try-stopped");
   await close(page);
 }
@@ -195,7 +195,7 @@ async function aPulledPlugAndNoise() {
   await page.keyboard.press("Enter");
   await says(card(page, "Motor 1"), "DOES NOT ANSWER");
   await page.locator("#stop").click();
-  await says(card(page, "Motor 1"), "no answer yet: it may be moving");
+  await says(card(page, "Motor 1"), "no answer yet: may be moving");
   await wait(500);
   await says(card(page, "Motor 1"), /Really\s*(0\.9|1\.0)/);
   await shot(page, "try-unplugged");
@@ -581,7 +581,7 @@ async function aStopStaysOwedUntilStandstillIsSeen() {
   await says(page.locator("#line-words"), "The port is closed");
   simulator.unplug(1, true);
   await page.locator("#line-connect").click();
-  await says(page.locator("#stop-words"), "Motor 1 (stop): sent, no answer yet");
+  await says(page.locator("#stop-words"), "Stop of motor 1: sent, no answer yet");
   await page.locator("#line-close").click();
   await wait(1000);
   await page.locator("#line-close").click();
@@ -645,7 +645,7 @@ async function aMotorThatNobodyHereHasMoved() {
   const simulator = wasm.Simulator.bus("1:velocity", 1, performance.now());
   otherMasterTurns(simulator, 1);
   const page = await scanned(simulator);
-  await says(page.locator("#stop-words"), "Motor 1 MOVES without an order from here");
+  await says(page.locator("#stop-alarm"), "Motor 1 is MOVING without an order from here");
   await page.keyboard.press("Space");
   await says(card(page, "Motor 1"), "seen at standstill");
   await close(page);
@@ -704,9 +704,9 @@ async function whatOthersMoveIsLeftAlone() {
     await says(page.locator("#line-words"), "The port is closed");
     await page.locator("#line-connect").click();
   };
-  await says(page.locator("#stop-words"), "Motor 2 MOVES without an order from here");
+  await says(page.locator("#stop-alarm"), "Motor 2 is MOVING without an order from here");
   await reconnect();
-  await says(page.locator("#stop-words"), "Motor 2 MOVES without an order from here");
+  await says(page.locator("#stop-alarm"), "Motor 2 is MOVING without an order from here");
   await page.locator("#line-arm").click();
   await card(page, "Motor 1").getByRole("button", { name: "Run" }).click();
   await until(() => turns(simulator) > 0.9, "motor 1 runs");
