@@ -7,11 +7,15 @@
 set -euo pipefail
 target=$1
 mkdir -p "$2"
-out=$(realpath "$2")
+out=$(cd "$2" && pwd)
 cd "$(dirname "$0")/../.."
-build=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+build=${CARGO_TARGET_DIR:-$PWD/target}
 version=$(cargo pkgid -p axlewire-cli)
-name=axle-${version##*[@#]}-$target
+version=${version##*[@#]}
+name=axle-$version-$target
+# No folder of this machine is in the program, as in `.ci/reproduce`.
+export "CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$target")_RUSTFLAGS=--remap-path-prefix=$PWD=/axlewire \
+    --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry=/cargo"
 bash .ci/cross "$target" build --quiet --release --locked -p axlewire-cli --bin axle
 # The newest: it may have been built with and without rustup's target.
 program=$(ls -t "$build"/{.,cross}/"$target"/release/axle{,.exe} 2>/dev/null | head -1) || [ -n "$program" ]
@@ -24,19 +28,27 @@ axle man "$pages/man"
 axle completions bash >"$pages/completions/axle"
 axle completions zsh >"$pages/completions/_axle"
 axle completions fish >"$pages/completions/axle.fish"
-cp -r "$program" LICENSE-* CHANGELOG.md examples/axle/README.md "$pages"
-mv -T "$pages" "$build/$name"
+cp "$program" LICENSE-* CHANGELOG.md "$pages"
+# Its links lead to the repository.
+there=$(sed -n 's/^repository = "\([^"]*\)".*/\1/p' Cargo.toml)/blob/v$version
+sed -E "s#\]\(\.\./\.\./#]($there/#g; s#\]\(\.\./#]($there/examples/#g; s#\]\(([a-z])#]($there/examples/axle/\1#g" \
+    examples/axle/README.md | sed "s#$there/examples/axle/https:#https:#g" >"$pages/README.md"
+# The licences of what is linked into it.
+command -v cargo-bundle-licenses >/dev/null || cargo install --quiet --locked cargo-bundle-licenses
+(cd examples/axle && cargo bundle-licenses --format yaml --output "$pages/LICENSES-OF-DEPENDENCIES.yaml" 2>/dev/null)
+rm -rf "${build:?}/$name"
+mv "$pages" "$build/$name"
 case $target in
 *windows*) (cd "$build" && python3 -m zipfile -c "$out/$name.zip" "$name") ;;
 # The same bytes for the same content.
 *linux*) tar --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -C "$build" -c "$name" | gzip -9n >"$out/$name.tar.gz" ;;
 *) tar -C "$build" -czf "$out/$name.tar.gz" "$name" ;;
 esac
-mv -T "$build/$name" "$pages"
+mv "$build/$name" "$pages"
 case $target in
 *linux*)
     command -v cargo-deb >/dev/null || cargo install --quiet --locked cargo-deb
-    CARGO_TARGET_DIR=$(realpath "$(dirname "$program")/../..") cargo deb --quiet -p axlewire-cli \
+    CARGO_TARGET_DIR=$(cd "$(dirname "$program")/../.." && pwd) cargo deb --quiet -p axlewire-cli \
         --no-build --no-strip --target "$target" --output "$out/"
     ;;
 esac

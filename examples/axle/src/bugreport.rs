@@ -81,6 +81,10 @@ pub(crate) struct Args {
 /// Longest text, bytes: it is one option of a block.
 const LONGEST_TEXT: usize = 60_000;
 
+/// A time that is so much earlier than the one in front of it was told by a clock that was set back,
+/// µs.
+const CLOCK_SET_BACK: u64 = 1_000_000;
+
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(file) = &args.show {
@@ -204,6 +208,7 @@ fn sum_up(
     let begin = last.saturating_sub(args.micros);
     // A packet without a time belongs to the one in front of it.
     let (mut is_in, mut numbers, mut packets) = (begin == 0, BTreeMap::new(), 0);
+    let mut latest = 0;
     let mut reader = Reader::new(&mut input);
     let problem = loop {
         let packet = match reader.next() {
@@ -212,6 +217,12 @@ fn sum_up(
             Err(problem) => break Some(problem),
         };
         let micros = packet.micros.filter(|micros| *micros <= LATEST_US);
+        if micros.is_some_and(|micros| micros + CLOCK_SET_BACK < latest) {
+            // What came before has larger times, and is not the end.
+            (writer, bytes, packets) = (Writer::default(), 0, 0);
+            numbers.clear();
+        }
+        latest = micros.unwrap_or(latest);
         is_in = micros.map_or(is_in, |micros| micros >= begin);
         let protocol = args.protocol.or(protocol_of(packet.described.link_type));
         let Some(protocol) = protocol.filter(|_| is_in) else { continue };
@@ -243,6 +254,9 @@ fn is_wanted(args: &Args, path: &Path, text: &str, bytes: usize) -> io::Result<b
     if args.yes {
         return Ok(true);
     }
+    // What was typed before the text was seen is no answer.
+    #[cfg(all(unix, feature = "dashboard"))]
+    let _ = rustix::termios::tcflush(io::stdin(), rustix::termios::QueueSelector::IFlush);
     say(&format!("Write it to {path:?}? [y/N] "))?;
     let mut answer = String::new();
     io::stdin().read_line(&mut answer)?;

@@ -101,6 +101,18 @@ fn the_lines_of_a_capture_stay_apart_and_keep_their_speed_but_not_their_names() 
     assert!(!unpacked.contains(&0x1B) && !unpacked.contains(&0x07));
 }
 
+#[test]
+fn what_came_before_the_clock_was_set_back_is_not_the_end_of_a_capture() {
+    let mut capture = PcapNg::new(147, &[(1_000_000_000, 0, &[0xAA])]);
+    capture.packet(0, (2_000_000_000, 0, &[0xAA, 0xAA]));
+    capture.packet(0, (500_000_000, 0, &[0xAA; 4]));
+    capture.packet(0, (510_000_000, 0, &[0xAA; 4]));
+    let source = file("back.pcapng", &capture.0);
+    let (_, text) = report("back.pcapng.gz", &["--capture", source.to_str().unwrap()]);
+    assert!(text.contains("1 times the clock went backwards"), "{text}");
+    assert!(text.contains("\nOf its last 60 s: 8 bytes in 2 packets\n"), "{text}");
+}
+
 /// The capture in a packed file.
 fn unpacked(path: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
