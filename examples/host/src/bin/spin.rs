@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("which port?")?;
     let mut bus = Bus::open(&path)?;
     println!("found: {:?}", bus.discover()?);
-    // An error of this call may mean that the motor is running: say so.
+    // On an error the motor may still be running.
     bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3))?;
     Ok(())
 }
