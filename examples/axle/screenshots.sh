@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 mkdir -p screenshots
-cargo test --quiet -p axlewire-cli --bin axle -- --ignored --exact \
+cargo test --quiet -p axlewire-cli --lib -- --ignored --exact \
     watch::page::shots::write_the_pictures
 for name in motors drive; do
     cargo run --quiet -p axlewire-cli --features plot -- \
