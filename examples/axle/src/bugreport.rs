@@ -81,8 +81,8 @@ pub(crate) struct Args {
 /// Longest text, bytes: it is one option of a block.
 const LONGEST_TEXT: usize = 60_000;
 
-/// A time that is so much earlier than the one in front of it was told by a clock that was set back,
-/// µs.
+/// A time that is so much earlier than the one in front of it was told by a clock that was set
+/// back, µs.
 const CLOCK_SET_BACK: u64 = 1_000_000;
 
 /// Runs the subcommand.
