@@ -50,7 +50,9 @@ rm -r "$work/$name/firmware/twin"
 mkdir "$work/$name/doc"
 cp src/safety.md src/guide/{ikeya,ucp}.md "$work/$name/doc"
 # The same pages, where they are in the zip; what else is named is in the repository.
-sed -i -E 's#\.\./\.\./src/(guide/)?(\w+\.md)#doc/\2#' "$work/$name/README.md"
+there=$(sed -n 's/^repository = "\([^"]*\)".*/\1/p' Cargo.toml)/blob/v${version##*@}
+sed -i -E "s#\.\./\.\./src/(guide/)?(\w+\.md)#doc/\2#; s#\]\(\.\./\.\./#]($there/#g
+    s#\]\((programs|arduino|tests|firmware/twin)/#]($there/examples/c/\1/#g" "$work/$name/README.md"
 cd "$work"
 (cd "$name" && find . -type f ! -name SHA256SUMS -exec sha256sum {} + | sort -k2 >SHA256SUMS)
 python3 -m zipfile -c "$out" "$name"
