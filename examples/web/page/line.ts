@@ -346,12 +346,10 @@ function setArmed(isArmed: boolean): void {
 export function draw(): void {
   const isArmed = machine?.isArmed ?? false;
   if (machine) machine.show();
-  const wasOwed = isSomethingOwed();
-  for (const id of machine?.standsStill() ?? []) owed[machineKind].delete(id);
-  if (wasOwed) keepOwed();
+  for (const id of machine?.picture.standsStill ?? []) if (owed[machineKind].delete(id)) keepOwed();
   say(owedAlarm, owedWords());
   show(owedAlarm, owedAlarm.textContent !== "");
-  const isPending = machine?.isStopPending ?? false;
+  const isPending = machine?.picture.isPending ?? false;
   if (closingSince !== undefined && machine && !isPending) void end();
   arm.setAttribute("aria-checked", String(isArmed));
   say(

@@ -44,7 +44,8 @@ export class MovingMachine implements Machine {
   isArmed: boolean;
   /** Somebody has pressed STOP. */
   wasStopped = false;
-  private picture: Picture = {
+  /** As of the last look, such as that of `show`. */
+  picture: Picture = {
     words: "",
     isPending: false,
     alarm: "",
@@ -147,11 +148,6 @@ export class MovingMachine implements Machine {
   /** What may be moving now, also when the line is gone. */
   mayMove(): number[] {
     return this.look().mayMove;
-  }
-
-  /** What was seen at standstill behind a stop. */
-  standsStill(): number[] {
-    return this.picture.standsStill;
   }
 
   /** Stops what an earlier session could not, whether or not it was heard yet, and nothing else. */

@@ -78,7 +78,7 @@ export function draw(): void {
   if (!simulation.isRunaway) runAway();
   const { machine } = simulation;
   machine.show();
-  const [wasPending, isPending] = [simulation.wasStopPending, machine.isStopPending];
+  const [wasPending, { isPending }] = [simulation.wasStopPending, machine.picture];
   simulation.wasStopPending = isPending;
   if (
     machine.session.closedBecause !== undefined ||

@@ -103,14 +103,19 @@ for (let phase = 0; phase < 40; phase += 1) {
   assert.ok(turns < 39, `phase ${phase}: it was not stopped, but has arrived`);
 }
 
+/** Another master turns this node. Returns the time. */
+function turnedByAnother(simulator, node) {
+  const other = new Bus(500_000, 600_000, 0);
+  other.discover(0);
+  const found = serve(other, simulator, 0, 2000);
+  other.set_velocity(node, 1, found);
+  return serve(other, simulator, found, 2000);
+}
+
 // One that is plugged in later is found and stopped behind a STOP.
 {
   const simulator = Simulator.bus("1:velocity 2:velocity", 1, 0);
-  const other = new Bus(500_000, 600_000, 0);
-  other.discover(0);
-  let now = serve(other, simulator, 0, 2000);
-  other.set_velocity(2, 1, now);
-  now = serve(other, simulator, now, 2000);
+  let now = turnedByAnother(simulator, 2);
   simulator.unplug(2, true);
   const bus = new Bus(500_000, 600_000, now);
   bus.discover(now);
@@ -131,11 +136,7 @@ for (let phase = 0; phase < 40; phase += 1) {
 // Also while another one, which is owed its stop, is missing.
 {
   const simulator = Simulator.bus("1:velocity 2:velocity", 1, 0);
-  const other = new Bus(500_000, 600_000, 0);
-  other.discover(0);
-  let now = serve(other, simulator, 0, 2000);
-  other.set_velocity(2, 1, now);
-  now = serve(other, simulator, now, 2000);
+  let now = turnedByAnother(simulator, 2);
   simulator.unplug(2, true);
   const bus = new Bus(500_000, 600_000, now);
   bus.discover(now);
@@ -157,11 +158,7 @@ for (let phase = 0; phase < 40; phase += 1) {
 
 {
   const simulator = Simulator.bus("1:velocity 8:velocity", 1, 0);
-  const other = new Bus(500_000, 600_000, 0);
-  other.discover(0);
-  let now = serve(other, simulator, 0, 2000);
-  other.set_velocity(8, 1, now);
-  now = serve(other, simulator, now, 2000);
+  let now = turnedByAnother(simulator, 8);
   const bus = new Bus(500_000, 600_000, now);
   bus.discover(now);
   while (state(bus, now).nodes[0].mode === null) now = serve(bus, simulator, now, 1);
