@@ -13,7 +13,7 @@ build=${CARGO_TARGET_DIR:-$PWD/target}
 version=$(cargo pkgid -p axlewire-cli)
 version=${version##*[@#]}
 name=axle-$version-$target
-# No folder of this machine is in the program, as in `.ci/reproduce`.
+# No folder of this machine is in the program.
 export "CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$target")_RUSTFLAGS=--remap-path-prefix=$PWD=/axlewire \
     --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry=/cargo"
 bash .ci/cross "$target" build --quiet --release --locked -p axlewire-cli --bin axle
