@@ -164,6 +164,6 @@ if command -v cargo-cinstall >/dev/null; then
     flags=$(PKG_CONFIG_PATH=$work/shared/lib/pkgconfig pkg-config --cflags --libs axlewire)
     gcc usual.c $flags -o "$work/by-cargo-c"
     LD_LIBRARY_PATH=$work/shared/lib "$work/by-cargo-c" >"$work/log"
-    nm -D "$work/by-cargo-c" | grep -q 'axle_crc16@libaxlewire.so.0.1'
+    nm -D "$work/by-cargo-c" | grep 'axle_crc16@libaxlewire.so.0.1' >/dev/null
 fi
 echo "all programs do what they say"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Makes the wheel that people install: release.sh OUT [OPTIONS OF MATURIN]
+# Makes the wheel that people install, and the sources for systems without one:
+# release.sh OUT [OPTIONS OF MATURIN]
 #
 # One for all versions of Python from 3.11 on; with --zig, for each Linux with glibc 2.17 or newer.
 # Needs maturin (`pip install "maturin[zig]"`).
@@ -14,3 +15,4 @@ cargo bundle-licenses --format yaml --output LICENSES-OF-DEPENDENCIES.yaml 2>/de
 RUSTFLAGS="--remap-path-prefix=$(cd ../.. && pwd)=/axlewire \
     --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry=/cargo" \
     maturin build --quiet --release --locked --out "$out" "$@"
+maturin sdist --quiet --out "$out"

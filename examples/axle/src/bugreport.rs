@@ -94,9 +94,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let name = || now.replace(['-', ':', 'Z'], "").replace('T', "-");
     let named = || format!("axle-bugreport-{}.pcapng.gz", name()).into();
     let path = args.output.clone().unwrap_or_else(named);
-    if path.exists() {
-        return Err(Failure::cannot_create(&path, &io::ErrorKind::AlreadyExists.into()));
+    if !path.as_os_str().as_encoded_bytes().ends_with(b".gz") {
+        return Err(Failure::Usage("it is packed: its name ends in .pcapng.gz".to_owned()));
     }
+    // What cannot be written is told now, and not behind a minute of listening.
+    File::create_new(&path)
+        .and_then(|_| fs::remove_file(&path))
+        .map_err(|error| Failure::cannot_create(&path, &error))?;
     if !(args.yes || io::stdin().is_terminal() && io::stderr().is_terminal()) {
         let line = "there is no terminal to ask on: with --yes, the file is written without asking";
         return Err(Failure::Usage(line.to_owned()));
@@ -108,6 +112,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let bytes: Rc<[u8]> = file.into_memory().into();
         let again = || Input::of(Box::new(Cursor::new(Rc::clone(&bytes))));
         (end, outcome) = (sum_up(args, again, &mut text)?, heard);
+        if end.1 == 0 {
+            text.push_str("Nothing was heard. Is it the right port, and does a device send?\n");
+        }
     } else if let Some(file) = &args.capture {
         if !file.is_file() {
             return Err(Failure::Failed(format!("{file:?} is not a file")));

@@ -173,6 +173,30 @@ fn a_file_that_is_there_is_not_replaced() {
 }
 
 #[test]
+fn what_cannot_be_written_is_told_in_front_of_the_listening() {
+    let folder = fresh("no_such_folder");
+    // The port is not there either: it would be told first, if it were opened first.
+    for (path, says) in
+        [(format!("{folder}/x.pcapng.gz"), "cannot create"), (fresh("x.txt"), "it is packed")]
+    {
+        let args = ["bugreport", "-p", "/no/port", "-P", "ucp", "--yes", "-o", &path];
+        let output = run(&args, &[]);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && line.contains(says), "{line}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_that_leads_nowhere_is_a_file_that_is_there() {
+    let path = fresh("link.pcapng.gz");
+    std::os::unix::fs::symlink("/no/such/file", &path).unwrap();
+    let line =
+        told(run(&["bugreport", "-p", "/no/port", "-P", "ucp", "--yes", "-o", &path], &[]), 1);
+    assert!(line.starts_with(&format!("axle: cannot create {path:?}")), "{line}");
+}
+
+#[test]
 fn what_has_no_times_is_refused_and_so_is_what_is_no_file() {
     let raw = concat!(env!("CARGO_MANIFEST_DIR"), "/../captures/ucp.bin");
     for (capture, code, says) in
