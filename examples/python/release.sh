@@ -15,4 +15,4 @@ cargo bundle-licenses --format yaml --output LICENSES-OF-DEPENDENCIES.yaml 2>/de
 RUSTFLAGS="--remap-path-prefix=$(cd ../.. && pwd)=/axlewire \
     --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry=/cargo" \
     maturin build --quiet --release --locked --out "$out" "$@"
-maturin sdist --quiet --out "$out"
+maturin sdist --out "$out"
