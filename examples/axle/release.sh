@@ -28,11 +28,12 @@ axle man "$pages/man"
 axle completions bash >"$pages/completions/axle"
 axle completions zsh >"$pages/completions/_axle"
 axle completions fish >"$pages/completions/axle.fish"
-cp "$program" LICENSE-* CHANGELOG.md "$pages"
+cp "$program" LICENSE-* "$pages"
 # Its links lead to the repository.
 there=$(sed -n 's/^repository = "\([^"]*\)".*/\1/p' Cargo.toml)/blob/v$version
 sed -E "s#\]\(\.\./\.\./#]($there/#g; s#\]\(\.\./#]($there/examples/#g; s#\]\(([a-z])#]($there/examples/axle/\1#g" \
     examples/axle/README.md | sed "s#$there/examples/axle/https:#https:#g" >"$pages/README.md"
+sed -E "s#\]\(([A-Z]+\.md)#]($there/\1#g" CHANGELOG.md >"$pages/CHANGELOG.md"
 # The licences of what is linked into it.
 command -v cargo-bundle-licenses >/dev/null || cargo install --quiet --locked cargo-bundle-licenses
 (cd examples/axle && cargo bundle-licenses --format yaml --output "$pages/LICENSES-OF-DEPENDENCIES.yaml" 2>/dev/null)

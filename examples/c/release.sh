@@ -49,6 +49,7 @@ cp -r examples/c/{include,firmware,README.md} LICENSE-* "$work/$name"
 rm -r "$work/$name/firmware/twin"
 mkdir "$work/$name/doc"
 cp src/safety.md src/guide/{ikeya,ucp}.md "$work/$name/doc"
+install -D -m 644 -t "$work/$name/examples/captures" examples/captures/*.bin
 # Links to items of the Rust crate lead nowhere here.
 sed -i -E 's#\[([^]]+)\]\((crate|super)[^)]*\)#\1#g; s#\[(`[^`]+`)\]([^(]|$)#\1\2#g; /^\[.*\]: (crate|super)/d' "$work/$name"/doc/*
 # The README without what takes the repository; the same pages, where they are in the zip.
@@ -57,7 +58,8 @@ mv "$work/README.md" "$work/$name"
 there=$(sed -n 's/^repository = "\([^"]*\)".*/\1/p' Cargo.toml)/blob/v${version##*@}
 sed -i -E "s#\.\./\.\./src/(guide/)?(\w+\.md)#doc/\2#; s#\]\(\.\./\.\./#]($there/#g
     s#\]\((programs|arduino|tests|firmware/twin)/#]($there/examples/c/\1/#g
-    s#examples/c/firmware/run.sh target/release/axle#firmware/run.sh axle#; s#\`rustup target add thumb[^,]*, ##" "$work/$name/README.md"
+    s#examples/c/firmware/run.sh target/release/axle#firmware/run.sh axle#; s#\`rustup target add thumb[^,]*, ##
+    s# On Debian and Ubuntu it installs.*##; s#\`(examples/c/release|tests/platformio/run).sh[^\`]*\`#& of the repository#" "$work/$name/README.md"
 cp -r "$work/$name/doc" "$work/axlewire/extras"
 cd "$work"
 (cd "$name" && find . -type f ! -name SHA256SUMS -exec sha256sum {} + | sort -k2 >SHA256SUMS)

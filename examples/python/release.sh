@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Makes the wheel that people install, and the sources for systems without one:
-# release.sh OUT [OPTIONS OF MATURIN]
+# Makes the wheel that people install: release.sh OUT [OPTIONS OF MATURIN]
 #
 # One for all versions of Python from 3.11 on; with --zig, for each Linux with glibc 2.17 or newer.
 # Needs maturin (`pip install "maturin[zig]"`).
@@ -9,10 +8,9 @@ mkdir -p "$1"
 out=$(cd "$1" && pwd)
 shift
 cd "$(dirname "$0")"
-# The licences of what is linked into it, and no folder of this machine.
+# With the licences of what is linked into it; its program names no folder of this machine.
 command -v cargo-bundle-licenses >/dev/null || cargo install --quiet --locked cargo-bundle-licenses
 cargo bundle-licenses --format yaml --output LICENSES-OF-DEPENDENCIES.yaml 2>/dev/null
 RUSTFLAGS="--remap-path-prefix=$(cd ../.. && pwd)=/axlewire \
     --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry=/cargo" \
     maturin build --quiet --release --locked --out "$out" "$@"
-maturin sdist --out "$out"

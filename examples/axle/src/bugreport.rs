@@ -95,9 +95,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let named = || format!("axle-bugreport-{}.pcapng.gz", name()).into();
     let path = args.output.clone().unwrap_or_else(named);
     if !path.as_os_str().as_encoded_bytes().ends_with(b".gz") {
-        return Err(Failure::Usage("it is packed: its name ends in .pcapng.gz".to_owned()));
+        return Err(Failure::Usage("it is packed: let its name end in .pcapng.gz".to_owned()));
     }
-    // What cannot be written is told now, and not behind a minute of listening.
+    // What cannot be created is told now, and not behind a minute of listening.
     File::create_new(&path)
         .and_then(|_| fs::remove_file(&path))
         .map_err(|error| Failure::cannot_create(&path, &error))?;
