@@ -102,6 +102,7 @@ def test_a_stop_returns_when_the_motor_is_seen_to_stand(port, rps):
 
 BEGIN = """import axlewire, gc, os, signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 port = sys.argv[1]
 class Holder: pass
 def bus(): return axlewire.Bus(port, dead_man_s=None)
